@@ -100,8 +100,6 @@ def measured(one: Run, other: Run, angles: tuple[float, ...]) -> None:
             wanted = [run.scalars[name] for run in (one, other) for name in names("femur") if found.statistic in name]
             lost = ~np.isfinite(wanted).all(axis=0)
             assert not np.isfinite(found.values[lost]).any(), "a number of what is none"
-    arms = joint_moment.force_arms(one, joint)
-    assert arms.shape == (4,)
 
 
 def written(world: Any, values: dict[str, Floats]) -> None:

@@ -5,7 +5,7 @@ passes without the fault.
 test that is red with a fault is red without it (``FAILS``). With ``--places`` it plants none and says in a second which of them
 have lost their place; with ``--list`` it plants none and names those that it would plant. ``faults.json`` keeps what came of each,
 when and at which commit; with ``--stale`` only those are planted whose row, file or tests are not what they were then. Comments,
-docstrings and layout of Python files may change without that.
+docstrings, layout and marks of slow tests may change without that.
 """
 
 import argparse
@@ -32,6 +32,7 @@ from fem_reference.foundations.subprocesses import command
 ROOT = Path(__file__).resolve().parent.parent
 LONGEST = 3600.0  # [s] that the tests of a fault may take
 _NO_END = "no end"
+_MARKS = ("pytest.mark.slow", "pytest.mark.nightly")
 LIST, RECORD = (Path(__file__).with_suffix(end) for end in (".toml", ".json"))
 
 
@@ -72,7 +73,7 @@ def fingerprint(root: Path, fault: Fault) -> str:
 
 
 def statements(path: Path) -> str:
-    """The statements of a Python file, without comments, docstrings and layout; the text of any other file."""
+    """The statements of a Python file, without comments, docstrings, layout and marks of slow tests; the text of any other file."""
     text = path.read_text(encoding="utf-8")
     if path.suffix != ".py":
         return text
@@ -80,6 +81,8 @@ def statements(path: Path) -> str:
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
             del node.body[0]
+        if isinstance(node, ast.FunctionDef):
+            node.decorator_list = [one for one in node.decorator_list if ast.unparse(one) not in _MARKS]
     return ast.unparse(tree)
 
 

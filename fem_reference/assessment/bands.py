@@ -1,4 +1,4 @@
-"""Bands over the frames from the answers of runs with other parameters: by a surrogate where that is good, else by the runs."""
+"""Bands over the frames from the results of runs with other parameters: by a surrogate if it is accurate, else by the runs."""
 
 import math
 from dataclasses import dataclass, replace
@@ -10,11 +10,11 @@ from fem_reference.assessment.gaussian_process import GaussianProcess
 from fem_reference.assessment.uncertainty import Band, Parameter
 from fem_reference.foundations.mesh import Floats
 
-# The greatest error with which a surrogate is still used, as a share of the variance.
+# The greatest error of a surrogate that is used, as a share of the variance.
 WORST = 0.05
 # The greatest allowed share of missing runs: if more were missing, all of them might lie beyond the 5th or 95th percentile.
 MISSING = 0.05
-# The least number of runs for percentiles without a surrogate: the 5th and the 95th must lie between values of runs.
+# The least number of runs for percentiles without a surrogate: the 5th and the 95th percentile must lie between values of runs.
 FEWEST = 20
 PERCENTILES = (0.05, 0.5, 0.95)
 _SAMPLES = 15  # the number of samples, as a power of 2
@@ -31,7 +31,7 @@ class Design:
 
     @property
     def refused(self) -> str:
-        """The reason why these runs are too few for a band, empty where they are not."""
+        """The reason why these runs are too few for a band, empty if they are not."""
         made, variables = len(self.points), self.points.shape[1]
         if made < 2 * (variables + 1):
             return f"{made} runs have answers, and {2 * (variables + 1)} are the fewest for {variables} parameters"
@@ -63,7 +63,7 @@ def of_values(band: Band, design: Design, values: Floats) -> Band:
 
 def of_field(band: Band, design: Design, products: Floats) -> Band:
     """The ``band`` of the root mean square of a field over its weights, from the ``products`` (f, n, n) of the weighted fields of
-    each two runs in each frame. The surrogate is of the field, by its principal components: a distance itself has a kink at 0.
+    each two runs in each frame. The surrogate describes the field by its principal components, as the distance has a kink at 0.
     """
     if refused := design.refused or _not_numbers(products):
         return replace(band, refused=refused)
@@ -116,6 +116,6 @@ def _samples(design: Design) -> Floats:
 
 
 def _not_numbers(values: Floats) -> str:
-    """The reason to refuse values that are not all numbers, empty where they are."""
+    """The reason to refuse values that are not all numbers, empty if they are."""
     bad = int((~np.isfinite(values)).sum())
     return f"{bad} values of runs are not numbers" if bad else ""

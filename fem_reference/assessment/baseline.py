@@ -1,4 +1,4 @@
-"""The baseline of a candidate: a JSON file with its measures and positions at one time, and the allowed changes of later ones."""
+"""The baseline of a candidate: a JSON file with its measures and positions at one time, and the allowed later changes."""
 
 import json
 import logging
@@ -30,14 +30,14 @@ PLACES = {"mm": 4, "%": 4, "deg": 4, "mm3": 1, "N": 4, "N mm": 2, "kPa": 4}
 POSITION_PLACES = 2
 # The greatest distance [mm] between a position and its rounded value.
 POSITION_ROUNDING = math.sqrt(3) * 0.5 * 10**-POSITION_PLACES
-# The number of sampled vertices, which take about 1.3 kB per frame. Motion of other vertices shows in the statistics only.
+# The number of sampled vertices, which take about 1.3 kB per frame. Motion of other vertices is visible only in the statistics.
 SAMPLED = 64
-# The tolerance of positions [mm] in a new baseline: far below visible differences. A solver whose results differ by more between
-# machines needs a greater one.
+# The tolerance of positions [mm] in a new baseline: far below visible differences. A solver whose results differ more between
+# machines needs a greater tolerance.
 MOVED = 0.1
 # The tolerance of a statistic is at most this share of its greatest value over the frames.
 SHARE = 0.02
-# The allowed value is a little above the measured one, for rounding.
+# The allowed value is slightly above the measured value, to allow for rounding.
 _ROUNDING = 1 + 1e-6
 README = (
     "tolerance: how far a value may be from the one stored here; within: how far from the reference it may be at most, in the "
@@ -56,7 +56,7 @@ class StoredStatistic(Record):
 
     @property
     def numbers(self) -> Floats:
-        """The values (f,), NaN where there is none."""
+        """The values (f,), NaN if there is none."""
         return np.array(self.values, float)
 
 
@@ -68,7 +68,7 @@ class Positions(Record):
     vertices: tuple[Annotated[int, Field(ge=0)], ...] = Field(min_length=1)
 
     def points(self, count: int, place: str) -> Floats:
-        """The values, NaN where there is none; InputError at ``place`` where a vertex number is not below ``count``."""
+        """The values, NaN if there is none; InputError at ``place`` if a vertex number is not below ``count``."""
         if max(self.vertices) >= count:
             raise InputError(f"{place}: positions.vertices", max(self.vertices), f"0 to {count - 1}")
         return np.array([[(math.nan,) * 3 if one is None else one for one in frame] for frame in self.values])
@@ -92,13 +92,13 @@ class Baseline(Record):
 
 
 def check(path: Path, case: MuscleCase, candidate: str) -> None:
-    """Raise InputError where an update of ``path`` would overwrite a damaged file, or one of another case or candidate."""
+    """Raise InputError if an update of ``path`` would overwrite a damaged file, or a file of another case or candidate."""
     if path.exists():
         _check_whose(path, _read(path), case, candidate)
 
 
 def read(path: Path, case: MuscleCase, candidate: str) -> Baseline:
-    """The baseline in ``path``; InputError where it is missing, damaged, or of another case, scene or candidate."""
+    """The baseline in ``path``; InputError if it is missing, damaged, or of another case, scene or candidate."""
     baseline = _read(path)
     _check_whose(path, baseline, case, candidate)
     if baseline.scene != case.key:
@@ -114,7 +114,7 @@ def read(path: Path, case: MuscleCase, candidate: str) -> Baseline:
 
 def update(path: Path, current: CurrentMeasures) -> Baseline:
     """Write the current values into ``path``. Every tolerance, and every ``within`` with a number, stays as in the file, so that
-    accuracy cannot be lost in small steps; statistics removed from the file stay out of it.
+    accuracy cannot be lost in small steps; statistics removed from the file are not added again.
     """
     check(path, current.scene, current.candidate.name)
     before = _read(path) if path.exists() else None
@@ -174,14 +174,14 @@ def _check_shape(place: str, baseline: Baseline) -> None:
 
 
 def _check_whose(path: Path, baseline: Baseline, case: MuscleCase, candidate: str) -> None:
-    """Raise InputError where a baseline belongs to another case or candidate."""
+    """Raise InputError if a baseline belongs to another case or candidate."""
     for key, got, want in (("case", baseline.case, case.name), ("candidate", baseline.candidate, candidate)):
         if got != want:
             raise InputError(f"{path}: {key}", f'"{got}"', f'"{want}", which is what is checked')
 
 
 def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> StoredStatistic:
-    """A statistic with its limits from ``before``, else with those that its error bars give."""
+    """A statistic with its limits from ``before``, or else from its error bars."""
     tolerance, within = limits(one, bars)
     if before is not None:
         tolerance, within = before.tolerance, within if before.within is None else before.within
@@ -194,9 +194,9 @@ def limits(one: Measure, bars: Floats) -> tuple[float, float | None]:
     """The tolerance of a change of a statistic and its greatest distance from the reference (None if not known) in a new baseline,
     from the error bars (f,) of a deviation.
 
-    Tolerance: the greatest bar, as a smaller change is no change of accuracy, but at most ``SHARE`` of the greatest value: stored
-    values are exact, however uncertain the reference is. Distance: the greatest sum of a value and its bar; for a measure of the
-    run itself, which has no bar, the greatest value plus its tolerance.
+    Tolerance: the greatest bar, as a smaller change is no change of accuracy, but at most ``SHARE`` of the greatest value, as
+    stored values are exact even if the reference is uncertain. Distance: the greatest sum of a value and its bar; for a measure of
+    the run itself, which has no bar, the greatest value plus its tolerance.
     """
     least = 10.0 * 10.0 ** -PLACES[one.unit]
     values, bar, itself = np.abs(one.values), greatest(bars), metrics.of_itself(one.metric)

@@ -2,26 +2,27 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from fem_reference.assessment.run_checks import BALANCE, ROUNDING, RunCheck
 from fem_reference.effects import region_of
-from fem_reference.foundations.mesh import Floats, corner_areas
-from fem_reference.problems.body import Body, Cells
+from fem_reference.foundations.mesh import Floats, TetMesh
+from fem_reference.geometry.quadratic import Displaced
+from fem_reference.problems.body import Body
 from fem_reference.runs.store import Frame, Run
 
 
 def balance(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """The sum of the recorded forces on a ``body`` and of dead loads; without loads also that of moments about the origin. No check
-    where not all forces are known: for a body that begins moved or under tension; effects of a user's own, follower loads, inertia
-    or drag; loads on cells other than straight tetrahedra; regions that share a prescribed component, each with the same force.
+    """The sum of the recorded forces on a ``body`` and of dead loads; without loads also the sum of moments about the origin. No
+    check if some forces are unknown: for a body that begins moved or under tension; with a user's own effects, follower loads,
+    inertia or drag; with loads on cells other than straight tetrahedra; with regions that share a prescribed component, each with
+    the same force.
     """
     residual, unknowns = getattr(solved.settings, "residual", math.nan), solved.outcome.cost.get("unknowns", math.nan)
     allowed, outer = BALANCE * residual * math.sqrt(unknowns), any(one.outer for one in body.effects)
-    for state in () if body.begun else solved.states[1:]:  # the first state is given, and need not be in balance
+    for state in () if body.begun else solved.states[1:]:  # the first state is prescribed, and need not be in balance
         load = _load(body, state.number)
         if load is None or not math.isfinite(allowed) or not _counted_once(body, state):
             return
@@ -38,7 +39,7 @@ def _sum(vectors: dict[str, Floats]) -> Floats:
 
 
 def _counted_once(body: Body, state: Frame) -> bool:
-    """True where a ``state`` has every force on a ``body``, and none twice."""
+    """True if a ``state`` has every force on a ``body``, and none twice."""
     others = {bone.name for bone in body.bones} | {name for law in body.touching for name in law.forces}
     names = {entry.name for entry in body.prescribed}
     if names & others or not names <= set(state.forces) or set(state.forces) != set(state.moments):
@@ -49,35 +50,13 @@ def _counted_once(body: Body, state: Frame) -> bool:
 
 
 def _load(body: Body, frame: float) -> Floats | None:
-    """The force (3,) [N] of external loads at a frame; None where it is not known from the shape at rest."""
+    """The force (3,) [N] of external loads at a frame; None if it is not known from the shape at rest."""
     if not all(type(one).__module__.startswith("fem_reference.effects.") for one in body.effects):
         return None
     acting, mesh = [one for one in body.effects if one.outer], body.mesh
     if acting and (mesh.kind != "tetrahedron" or mesh.degree > 1 or any(map(region_of, acting))):
         return None
-    found = [(one.amount(frame), one.resultant(_AtRest(mesh))) for one in acting]
+    rest = Displaced(TetMesh(mesh.points, mesh.cells, mesh.facets))  # the present positions are not known
+    found = [(one.amount(frame), one.resultant(rest)) for one in acting]
     forces = [amount * load.force for amount, load in found if load is not None]
     return None if len(forces) < len(acting) else np.sum([np.zeros(3), *forces], axis=0)
-
-
-@dataclass(frozen=True, eq=False)
-class _AtRest:
-    """The shape at rest of straight tetrahedra, as a :class:`fem_reference.foundations.loads.Shape`."""
-
-    mesh: Cells
-
-    def measure(self, on: str | None = None) -> tuple[float, Floats]:
-        """The volume [mm3] or an area [mm2]; the present positions are not known."""
-        if on is not None:
-            return float(corner_areas(self.mesh.points[self.mesh.facets[on]]).sum()), np.full(3, np.nan)
-        corners = self.mesh.points[self.mesh.cells]
-        volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
-        return float(volumes.sum()), np.full(3, np.nan)
-
-    def facing(self, on: str) -> None:  # noqa: ARG002
-        """Nothing: the present shape is not known."""
-        return
-
-    def motion(self) -> None:
-        """Nothing: the velocity is not known."""
-        return

@@ -26,8 +26,8 @@ _CORRELATED = 0.95
 # A combination of parameters is undetermined if its singular value is below this share of the greatest.
 _NOTHING = 1e-6
 _WANT = f"a CSV file whose first row is {','.join(COLUMNS)}"
-# A function from several points (d,), in shares of the ranges, to the values (m,) that their runs have for the data; None for a
-# point without an answer.
+# A function from several points (d,), in shares of the ranges, to the values (m,) of their runs for the data; None for a point
+# without a result.
 Forward = Callable[[Sequence[Floats]], Sequence[Floats | None]]
 # The greatest number of evaluations per parameter, not counting finite differences.
 _MOST = 50
@@ -52,8 +52,8 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fitted parameter, in the unit of ``parameter``: its ``value`` and confidence interval from ``low`` to ``high``, infinite
-    where the measurements do not determine it; ``at``: the end of the range that it is at, ``"low"``, ``"high"`` or empty.
+    """A fitted parameter, in the unit of ``parameter``: its ``value`` and confidence interval from ``low`` to ``high``, infinite if
+    the measurements do not determine it; ``at``: the end of the range at which it is, ``"low"``, ``"high"`` or empty.
     """
 
     parameter: Parameter
@@ -64,17 +64,17 @@ class Estimate:
 
     @property
     def is_known(self) -> bool:
-        """True where the interval is narrower than the range that was allowed."""
+        """True if the interval is narrower than the allowed range."""
         return self.high - self.low < self.parameter.high - self.parameter.low
 
 
 @dataclass(frozen=True)
 class Calibration:
     """Fitted ``estimates`` of a case. ``scatter``: root mean square of the residuals, per degree of freedom, in standard deviations
-    of the data: near 1 where law and data agree. ``singular``: singular values of the matrix of sensitivities, in standard
-    deviations per range. ``pairs``: titles of parameters whose errors are correlated, with the correlation. ``runs``: the number of
-    requested runs; ``failures``: those that failed; ``ended``: why the fit could not continue and has no intervals, else empty;
-    ``converged``: True where no step leads nearer to the measurements.
+    of the data: near 1 if law and data agree. ``singular``: singular values of the matrix of sensitivities, in standard deviations
+    per range. ``pairs``: titles of parameters whose errors are correlated, with the correlation. ``runs``: the number of requested
+    runs; ``failures``: the failed runs; ``ended``: the reason why the fit could not continue and has no intervals, else empty;
+    ``converged``: True if no step leads nearer to the measurements.
     """
 
     case: str
@@ -91,17 +91,17 @@ class Calibration:
 
     @property
     def is_followed(self) -> bool:
-        """True where the law fits the data to within their scatter."""
+        """True if the law fits the data to within their scatter."""
         return self.scatter <= FOLLOWED
 
     @property
     def holds(self) -> bool:
-        """True where the fit has converged, the law fits the data, and all estimates are known within their ranges."""
+        """True if the fit has converged, the law fits the data, and all estimates are known within their ranges."""
         return self.converged and self.is_followed and all(one.is_known and not one.at for one in self.estimates)
 
 
 def read(path: Path, units: Callable[[str, str], str]) -> tuple[Measurement, ...]:
-    """The measurements in a CSV file; ``units(quantity, place)`` is the unit of a quantity, or InputError where there is none."""
+    """The measurements in a CSV file; ``units(quantity, place)`` is the unit of a quantity, or InputError if there is none."""
     head, *lines = files.read_rows(path) or [[]]
     if tuple(one.strip() for one in head) != COLUMNS:
         raise InputError(path, f'the first row "{",".join(head)}"', _WANT)
@@ -129,7 +129,7 @@ def _row(line: list[str], place: str, units: Callable[[str, str], str]) -> Measu
 
 
 class _NoAnswerError(Exception):
-    """Raised at a point without an answer where the fit needs one."""
+    """Raised at a point without a result that the fit needs."""
 
 
 class _Residuals:
@@ -140,7 +140,7 @@ class _Residuals:
         self.values, self.deviations = (np.array([getattr(row, name) for row in rows]) for name in ("value", "sd"))
 
     def at(self, points: Sequence[Floats]) -> list[Floats]:
-        """The residuals (m,) at each point, infinite where it has no answer."""
+        """The residuals (m,) at each point, infinite if it has no answer."""
         asked = [point for point in points if point.tobytes() not in self.known]
         for point, found in zip(asked, self.forward(asked), strict=True):
             lost = np.full(len(self.values), np.inf)
@@ -163,9 +163,9 @@ class _Residuals:
 
 
 def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measurement], case: str) -> Calibration:
-    """The parameters within their ranges for which the values by ``forward`` are nearest to the measurements, in their standard
-    deviations. The fit starts from the case's own values and steps back from a point without an answer; if that is the start, or a
-    point for sensitivities, the fit ends and states so. InputError unless there are more measurements than parameters.
+    """The parameters within their ranges for which the values of ``forward`` are nearest to the measurements, in standard
+    deviations. The fit starts from the values of the case and steps back from a point without a result; if this is the start, or a
+    point for sensitivities, the fit ends with the reason. InputError unless there are more measurements than parameters.
     """
     if len(rows) <= len(parameters):
         raise InputError("data", f"{len(rows)} rows for {len(parameters)} parameters", "more rows than parameters")
@@ -233,7 +233,7 @@ def _estimate(parameter: Parameter, place: float, width: float) -> Estimate:
 
 def _pairs(covariance: Floats, nothing: Floats, parameters: Sequence[Parameter]) -> tuple[tuple[str, str, float], ...]:
     """The titles of pairs of parameters whose errors are correlated, with the correlation: from the undetermined combinations
-    ``nothing`` if both take part in these, else from the ``covariance`` of the determined ones.
+    ``nothing`` if both are part of them, else from the ``covariance`` of the determined combinations.
     """
     lost, found = nothing.T @ nothing, list[tuple[str, str, float]]()
     for i, one in enumerate(parameters):

@@ -11,7 +11,7 @@ from fem_reference.problems.body import Body
 from fem_reference.runs.store import Run
 
 Kind = Literal["closed form", "published", "second solver", "property", "experiment"]
-# The relative difference allowed between the value of an experiment and the pinned one, due to root finding and processors.
+# The allowed relative difference between the value of an experiment and the pinned value, due to root finding and processors.
 PINNED = 1e-5
 
 
@@ -29,8 +29,8 @@ class Lab(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """A measurement: the ``value``; on a ladder of meshes also the ``order`` at which its error falls, and the ``ladder`` of
-    (mesh size [mm], value) from coarse to fine; ``note``: further facts for readers.
+    """A measurement: the ``value``; on a ladder of meshes also the ``order`` of its error, and the ``ladder`` of (mesh size [mm],
+    value) from coarse to fine; ``note``: further facts for readers.
     """
 
     value: float
@@ -44,7 +44,7 @@ class Refinement:
     """Meshes, or steps in time, from coarse to fine.
 
     ``counts``: numbers of cells or steps, each of ``size / count`` [mm] or [s]. The theoretical ``order`` of the error must be met
-    to within a half; None: no order is measured. Where ``extrapolated``, the value is extrapolated from the last two counts, for an
+    to within a half; None: no order is measured. If ``extrapolated``, the value is extrapolated from the last two counts, for an
     error of first order. ``note``: further facts for readers.
     """
 
@@ -56,7 +56,7 @@ class Refinement:
 
     @property
     def needed(self) -> tuple[int, ...]:
-        """The counts that the value needs."""
+        """The counts needed for the value."""
         return self.counts[-2 if self.extrapolated else -1 :]
 
     def value(self, found: Sequence[float]) -> float:
@@ -68,17 +68,17 @@ class Refinement:
 class Entry:
     """A problem with a known answer.
 
-    ``measure`` finds the number that ``truth`` states, both in ``unit``. Its arguments are a lab, each count of a ``refinement``
-    where there is one, and the values ``given`` by name. The number must come within ``within`` (in ``unit``, or of the truth's
-    size where ``relative``); ``because`` gives the reason for this tolerance. ``source`` is that of the truth, ``kind`` its type.
-    ``negative_control`` names a deliberate mistake; with its values ``wrong`` in place of those ``given`` the entry must fail.
-    ``slow``: a measurement takes more than 4 s, or resembles another; ``slow_negative_control``: the control does. Only verify
-    measures these.
+    ``measure`` computes the number to compare with ``truth``, both in ``unit``. Its arguments are a lab, each count of a
+    ``refinement`` if there is one, and the values ``given`` by name. The number must equal the truth to ``within`` (in ``unit``, or
+    relative to the truth if ``relative``), for the reason ``because``. ``source``: the source of the truth; ``kind``: its type.
+    ``negative_control`` names a deliberate mistake; with the values ``wrong`` instead of ``given`` the entry must fail. ``slow``: a
+    measurement takes more than 4 s, or resembles another; ``slow_negative_control``: the same for the control. Only verify measures
+    these.
 
     An entry of the kind "experiment" compares a model with a muscle: its verdict is "within" or "outside" the uncertainty of the
-    experiment, and neither is a failure. It fails where the value is no longer the ``pinned`` one. ``facts``: the measured
-    numbers from which its truth is made; ``is_order``: True for an order, which is met (1) or not (0), to a half;
-    ``from_memory``: True where a part of its model or of its source is from memory.
+    experiment, and neither is a failure. It fails if the value no longer equals ``pinned``. ``facts``: the measured numbers from
+    which its truth is made; ``is_order``: True for an order, which is met (1) or not (0), to a half; ``from_memory``: True if a
+    part of its model or of its source is from memory.
     """
 
     name: str
@@ -128,8 +128,8 @@ def _finding(found: float | Finding) -> Finding:
 @dataclass(frozen=True, eq=False)
 class Result:
     """The result of an entry. ``word``: the verdict: pass or fail, inconclusive without a truth, and for an experiment within or
-    outside; ``error``: the absolute error, and ``within``: its bound, both in the unit of the entry and NaN without a measurement
-    or a truth; then the finding's note gives the reason.
+    outside; ``error``: the absolute error, and ``within``: its bound, both in the unit of the entry. Without a measurement or a
+    truth they are NaN, and the note of the finding gives the reason.
     """
 
     entry: Entry
@@ -146,7 +146,7 @@ class Result:
 
     @property
     def word(self) -> str:
-        """Pass, fail or inconclusive; for an experiment within or outside its uncertainty, or fail where the value has moved."""
+        """Pass, fail or inconclusive; for an experiment within or outside its uncertainty, or fail if the value has changed."""
         judged, pinned = judge(self.finding.value, self.truth, self.within), self.entry.pinned
         if pinned is None:
             return judged
@@ -163,7 +163,7 @@ def result(entry: Entry, finding: Finding, seconds: float, *, with_negative_cont
 
 
 def order(ladder: tuple[tuple[float, float], ...], truth: float) -> float | None:
-    """The order at which the error falls over the last two meshes of a ``ladder`` of (size, value), None where one is exact.
+    """The order of the error over the last two meshes of a ``ladder`` of (size, value), None if one of them is exact.
 
     >>> round(order(((2.0, 1.04), (1.0, 1.01)), 1.0), 6)
     2.0
@@ -185,23 +185,23 @@ class Verification:
 
     @property
     def failed(self) -> tuple[Result, ...]:
-        """The results that do not pass; experiments within or outside their uncertainty do."""
+        """The results that do not pass; experiments within or outside their uncertainty pass."""
         return tuple(one for one in self.results if one.word not in ("pass", "within", "outside"))
 
     @property
     def judged(self) -> tuple[Result, ...]:
-        """The results that pass or fail by their tolerance: those of all entries but experiments."""
+        """The results that pass or fail by their tolerance: the results of all entries except experiments."""
         return tuple(one for one in self.results if one.entry.kind != "experiment")
 
     @property
     def passed(self) -> str:
-        """The number of judged results that pass, in words; empty where there are none."""
+        """The number of judged results that pass, in words; empty if there are none."""
         failed = sum(one in self.failed for one in self.judged)
         return f"{len(self.judged) - failed} of {len(self.judged)} pass" if self.judged else ""
 
     @property
     def beside(self) -> str:
-        """The number of experiments, and of those met within their uncertainty, in words; empty without experiments."""
+        """The number of experiments, and the number met within their uncertainty, in words; empty without experiments."""
         words = [one.word for one in self.results if one.entry.kind == "experiment"]
         return f"{words.count('within')} of {len(words)} experiments met within their uncertainty" if words else ""
 

@@ -8,7 +8,7 @@ import numpy as np
 from fem_reference.assessment.error_bars import ErrorBars, Of
 from fem_reference.metrics import Measure, described, find
 
-# The finer solution has a mesh of its own, with tetrahedra of this share of the reference's size.
+# The finer solution has a separate mesh, with tetrahedra of this share of the reference's size.
 FINER = 0.8
 # Statistics whose bars are compared with errors: metric and name.
 CLAIMED = tuple(described("claim"))
@@ -31,7 +31,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Cover:
-    """A ``count`` of claims, the ``share`` of them whose error is within the bar, and the ``median`` ratio of bar to error."""
+    """A ``count`` of claims, the ``share`` of claims whose error is within the bar, and the ``median`` ratio of bar to error."""
 
     count: int
     share: float
@@ -39,7 +39,7 @@ class Cover:
 
     @classmethod
     def of(cls, claims: Iterable[Claim]) -> "Cover":
-        """The cover of ``claims``; NaN where there are none."""
+        """The cover of ``claims``; NaN if there are none."""
         known = [claim for claim in claims if claim.error > LEAST]
         if not known:
             return cls(0, np.nan, np.nan)
@@ -49,7 +49,9 @@ class Cover:
 
 @dataclass(frozen=True, eq=False)
 class Claims:
-    """All claims; by case the ``sizes`` [mm] of the reference's and the finer tetrahedra; ``missing``: by case, why it has none."""
+    """All claims; by case the ``sizes`` [mm] of the reference's and the finer tetrahedra; ``missing``: by case, why it has no
+    claims.
+    """
 
     claims: tuple[Claim, ...]
     sizes: dict[str, tuple[float, float]]

@@ -33,10 +33,11 @@ from fem_reference.scenes.case import Case, Expectation
 
 @dataclass(frozen=True)
 class Convergence:
-    """The same case on successively halved meshes: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the finest two.
+    """The same case on successively halved meshes: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the two finest
+    meshes.
 
-    ``against`` defines the error: the L2 distance to the exact solution, or the rms distance at the vertices to the finest
-    solution of order 2. ``order`` is NaN where the errors are rounding.
+    ``against`` defines the error: the L2 distance to the exact solution, or the rms distance at the vertices from the finest
+    solution of order 2. ``order`` is NaN if the errors are rounding.
     """
 
     element: str
@@ -49,10 +50,10 @@ class Convergence:
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """``setup``: the muscle's ``Setup`` or the ``FieldProblem``. ``deviations``: by candidate name, its measures against the
-    reference. ``changes``: by run name (``"reference"`` among them), its measures against the rest state; for a field, which has
-    none, those that need no reference. ``extension_error`` [mm]: by frame, the greatest error over the fibres of the extension on
-    the reference's own surface, None where there is none. ``error_bars``: those of the reference, None if not computed;
-    ``ladders``: its convergence, where measured.
+    reference. ``changes``: by run name (``"reference"`` among them), its measures against the rest state; for a field, which has no
+    rest state, measures without a reference. ``extension_error`` [mm]: by frame, the greatest error over the fibres of the
+    extension on the reference's surface, None without an extension. ``error_bars``: bars of the reference, None if not computed;
+    ``ladders``: its convergence, if measured.
     """
 
     scene: Case
@@ -74,7 +75,7 @@ class Comparison:
 
     def __getitem__(self, key: tuple[str, str, str]) -> Measure:
         """The measure of a candidate by its name, a metric and a statistic, such as ``"mine", "volume", "deviation"``; for
-        ``"reference"`` its change from rest. KeyError where there is none.
+        ``"reference"`` its change from rest. KeyError if there is none.
         """
         name, metric, statistic = key
         measures = self.changes["reference"] if name == "reference" else self.deviations.get(name, ())
@@ -115,13 +116,13 @@ class Comparison:
 
     @property
     def word(self) -> Word:
-        """The verdict of the case; a denied reference is never the basis of one."""
+        """The verdict of the case; a denied reference is never the basis of a verdict."""
         if self.reference.outcome.status == "denied":
             return "fail"
         return doubted(overall(one.word for one in self.verdicts), self.doubts)
 
     def word_of(self, name: str) -> Word:
-        """The verdict on a run by its name; a reference that did not converge fails, even where it meets its expectations."""
+        """The verdict on a run by its name; a reference that did not converge fails, even if it meets its expectations."""
         found = overall(one.word for one in self.verdicts if one.expectation.of == name)
         if name != "reference":
             return found
@@ -132,8 +133,8 @@ def compare(
     case: Case, setup: CaseSetup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
     """Measure and judge runs of a case against the ``reference`` as the truth; only the parts that a run carries are judged.
-    ``candidates`` have all frames of the case, NaN where one was not reached; a measure that ``error_bars`` leave in doubt is
-    inconclusive. InputError where the case expects a measure of a named run that lacks it because it has no surface.
+    ``candidates`` have all frames of the case, with NaN for frames not reached; a measure that is uncertain within ``error_bars``
+    is inconclusive. InputError if the case expects a measure of a named run that lacks it because it has no surface.
     """
     context, runs = context_of(setup, reference), (reference, *candidates)
     candidate, alone = names(case.standards("candidates")), names(case.standards("reference"))
@@ -179,12 +180,12 @@ def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
 
 
 def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:
-    """True where the expected measure is among ``measures``; a run without a surface lacks many."""
+    """True if the expected measure is among ``measures``; a run without a surface lacks many."""
     return find(measures, expectation.metric, str(expectation.statistic)) is not None
 
 
 def _with_bars(measures: tuple[Measure, ...], of: Of, error_bars: ErrorBars | None) -> tuple[Measure, ...]:
-    """The ``measures``, each with its error bars where they exist."""
+    """The ``measures``, each with its error bars if they exist."""
     if error_bars is None:
         return measures
     known = [(one, error_bars.find(of, one.metric, one.statistic)) for one in measures]
@@ -197,7 +198,7 @@ def reached_frames(run: Run) -> Ints:
 
 
 def reached(comparison: Comparison) -> Comparison:
-    """The comparison without the frames that a failed reference did not reach; unchanged where it reached all, or none."""
+    """The comparison without the frames that a failed reference did not reach; unchanged if it reached all frames, or none."""
     kept = reached_frames(comparison.reference)
     if comparison.reference.outcome.status == "converged" or len(kept) in (0, len(comparison.reference.numbers)):
         return comparison

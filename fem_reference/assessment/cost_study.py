@@ -17,7 +17,7 @@ from fem_reference.io import texts
 FORMAT = 1
 # The least and the greatest value that a feature of a case can have, in its unit.
 _LEAST, _MOST, _FINEST = 1e-9, 1e15, 20
-# The features by which recommendations compare cases; those by which they divide are above zero.
+# The features by which recommendations compare cases; features used as divisors are above zero.
 FEATURES = ("size", "triangles", "motion", "contact", "bulk_to_shear", "fibres_to_shear", "tet_size", "refinements")
 _ABOVE_ZERO = ("size", "triangles", "tet_size")
 _WANT = "a study as the verb study writes it"
@@ -25,10 +25,10 @@ _WANT = "a study as the verb study writes it"
 
 @dataclass(frozen=True, eq=False)
 class CaseStudy:
-    """The points of a case. ``units`` of errors by ``metric.statistic``, and ``bars``, the error bars of the truth, by the same;
+    """The points of a case. ``units`` of errors, and ``bars``, the error bars of the truth, by ``metric.statistic``;
     ``truth``: its description; ``claims``: error bars of coarser members with their errors; ``triangles``; ``travel`` [mm], the
     greatest displacement of the truth; ``features`` of the case, as far as its scene states them (:mod:`studies.features`);
-    ``truth_key``: the folder of the truth's run in a store, "" where that is not known.
+    ``truth_key``: the folder of the truth's run in a store, "" if it is not known.
     """
 
     case: str
@@ -86,7 +86,7 @@ def facts(case: CaseStudy, origin: dict[str, str]) -> dict[str, Any]:
 
 
 def load(path: Path) -> list[CaseStudy]:
-    """The study of a case, or those of several, from a file written by :func:`facts`; InputError with the key that is invalid."""
+    """The study of a case, or of several cases, from a file written by :func:`facts`; InputError with the invalid key."""
     found = texts.read_json(path, _WANT)
     if isinstance(found, list) and found:
         return [_read(one, f"{path}: [{i}]") for i, one in enumerate(found)]
@@ -104,7 +104,7 @@ def _read(table: Any, place: str) -> CaseStudy:
 
 
 def _check(study: CaseStudy, place: str) -> None:
-    """Raise InputError below ``place`` where a study lacks a feature, has an unknown unit, or unusable points."""
+    """Raise InputError below ``place`` if a study lacks a feature, or has an unknown unit or unusable points."""
     _check_features(study, place)
     known = metrics.units()
     for name, unit in study.units.items():
@@ -119,7 +119,7 @@ def _check(study: CaseStudy, place: str) -> None:
 
 
 def _check_features(study: CaseStudy, place: str) -> None:
-    """Raise InputError below ``place`` where a study lacks a feature, or a feature has a value that no case can have."""
+    """Raise InputError below ``place`` if a study lacks a feature, or a feature has an impossible value."""
     for name in FEATURES:
         if name not in study.features:
             raise InputError(f"{place}: features.{name}", "nothing", "this number: run the verb study again")
@@ -133,7 +133,7 @@ def _check_features(study: CaseStudy, place: str) -> None:
 
 
 def _check_scene(scene: Any, place: str) -> None:
-    """Raise InputError where a point's changed keys of the scene are not a table, or state no size of tetrahedra."""
+    """Raise InputError if a point's changed keys of the scene are not a table, or state no size of tetrahedra."""
     if not isinstance(scene, dict):
         raise InputError(place, repr(scene), "a table of keys")
     for key in TETRAHEDRA if {*TETRAHEDRA} & {*scene} else ():

@@ -17,16 +17,16 @@ from fem_reference.assessment.moment_arms import ArmsBeside
 from fem_reference.foundations.records import Record, parse
 
 FILE = Path(__file__).with_suffix(".toml")
-_ROUNDED = 0.5  # the rounding of a share that is published in whole per cent
+_ROUNDED = 0.5  # the rounding of a share published without decimals, in per cent
 _WHOLE = 100.0  # all poses, in per cent
 _READ = ("publication", "abstract", "quotation", "memory")  # the texts in which numbers were read, the best first
-# "outside": the model differs from some measurement by more than its uncertainty, even if it agrees with others.
+# "outside": the model differs from some measurement by more than its uncertainty, even if it agrees with other measurements.
 Grade = Literal["validated", "indicative", "outside", "verified only", "not measured"]
 
 
 class Evidence(Record):
     """The stated evidence of a quantity: groups of the catalogue that verify it, ``closed_forms`` and ``other_codes`` in words, the
-    numerical ``bar``, facts of its model ``band``, and its comparisons with ``experiments``, described in words by ``compared``.
+    numerical ``bar``, facts of its model ``band``, and its comparisons with ``experiments``, described in words in ``compared``.
     """
 
     name: str
@@ -53,10 +53,10 @@ def claims() -> tuple[Evidence, ...]:
 
 @dataclass(frozen=True)
 class Beside:
-    """A value of the model beside a known one, both in ``unit``: the ``truth`` with its uncertainty ``within``, from ``n``
-    specimens, None where unknown; ``validates``: True if agreement counts as validation; ``rests_on``: the text in which the
-    truth was read, and the unmeasured parts of truth or model; ``kind``: measurement, or model where another model is the truth;
-    ``is_order``: True for an order, which is met (1) or not (0), to a half.
+    """A value of the model compared with a known value, both in ``unit``. ``truth``: the known value; ``within``: its uncertainty;
+    ``n``: the number of specimens, None if unknown. ``validates``: True if agreement counts as validation. ``rests_on``: the text
+    in which the truth was read, and the unmeasured parts of truth or model. ``kind``: measurement, or model if another model is the
+    truth. ``is_order``: True for an order, which is met (1) or not (0), to a half.
     """
 
     name: str
@@ -76,15 +76,15 @@ class Beside:
 
 
 def count(several: Iterable[Beside], kind: Kind) -> tuple[int, int]:
-    """The number of comparisons of a ``kind`` that are met, and the number of all of that kind."""
+    """The number of comparisons of a ``kind`` that are met, and the number of all comparisons of this kind."""
     met = [one.met for one in several if one.kind == kind]
     return sum(met), len(met)
 
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A quantity with its evidence: the ``kinds`` of catalogue entries behind it and the ``orders`` that they must show; the
-    ``band`` of facts, least and greatest; comparisons ``beside`` experiments.
+    """A quantity with its evidence: the ``kinds`` of catalogue entries that verify it and the ``orders`` that they must show; the
+    ``band`` of facts, least and greatest; the comparisons with experiments (``beside``).
     """
 
     claim: Evidence
@@ -95,12 +95,12 @@ class Row:
 
     @property
     def measured(self) -> tuple[int, int]:
-        """The number of measurements within whose uncertainty the model is, and of all."""
+        """The number of measurements with which the model agrees within their uncertainty, and of all measurements."""
         return count(self.beside, "measurement")
 
     @property
     def models(self) -> tuple[int, int]:
-        """The number of other models within their tolerance, and of all; they are no evidence about muscles."""
+        """The number of other models within their tolerance, and of all other models, which are no evidence about muscles."""
         return count(self.beside, "model")
 
     @property
@@ -111,18 +111,18 @@ class Row:
 
     @property
     def bias(self) -> float:
-        """The mean of :attr:`misses`; NaN for none."""
+        """The mean of :attr:`misses`; NaN without misses."""
         return float(np.mean(self.misses)) if self.misses else math.nan
 
     @property
     def scatter(self) -> float:
-        """The standard deviation of :attr:`misses`; NaN for none."""
+        """The standard deviation of :attr:`misses`; NaN without misses."""
         return float(np.std(self.misses)) if self.misses else math.nan
 
     @property
     def grade(self) -> Grade:
-        """Outside where one measurement is not met, else validated by one that counts and indicative by others; verified only where
-        no experiment is known, and not measured where its data is not installed. Other models do not enter.
+        """Outside if one measurement is not met; else validated if some measurement counts as validation, otherwise indicative.
+        Verified only if no experiment is known; not measured if its data is not installed. Other models do not count.
         """
         met, of = self.measured
         if of == 0:
@@ -133,7 +133,7 @@ class Row:
 
 
 def verifying(claim: Evidence, entries: Iterable[Entry]) -> list[Entry]:
-    """The ``entries`` of the catalogue that verify a ``claim``; LookupError where one of its groups does not exist."""
+    """The ``entries`` of the catalogue that verify a ``claim``; LookupError if one of its groups does not exist."""
     behind = [one for one in entries if one.group in claim.verified]
     if missing := set(claim.verified) - {one.group for one in behind}:
         raise LookupError(f"{claim.name}: no group {sorted(missing)} in the catalogue")
@@ -143,7 +143,7 @@ def verifying(claim: Evidence, entries: Iterable[Entry]) -> list[Entry]:
 def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result], arms: Iterable[ArmsBeside]) -> Row:
     """The row of a ``claim``, from all ``entries`` of the catalogue, ``results`` of experiments by name, and moment arms.
 
-    KeyError where an experiment was not measured, LookupError where a group of the catalogue does not exist.
+    KeyError if an experiment was not measured, LookupError if a group of the catalogue does not exist.
     """
     behind = verifying(claim, entries)
     orders = {one.refinement.order for one in behind if one.refinement and one.refinement.order is not None}
@@ -154,7 +154,7 @@ def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result]
 
 
 def of_result(found: Result) -> Beside:
-    """A measured entry of the kind experiment; it validates only where each of its facts does and its model is not from memory."""
+    """A measured entry of the kind experiment; it validates only if all its facts do and its model is not from memory."""
     entry = found.entry
     facts = entry.facts
     counted = not entry.from_memory and bool(facts) and all(one.validates for one in facts)
@@ -179,8 +179,8 @@ def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> 
 
 
 def of_arms(arms: ArmsBeside) -> Beside:
-    """Moment arms beside a measured curve, which should be within their range in all poses, or beside another model's range, of
-    which the arms should cover the same share [%] as those of Modenese and Kohout 2020.
+    """Moment arms compared with a measured curve, which should be within their range in all poses, or with the range of another
+    model, of which the arms should cover the same share [%] as the arms of Modenese and Kohout 2020.
     """
     others_reach = reached(arms)
     words = "poses with the measured arm inside the fibres' range" if arms.is_curve else "overlap with a model's range"
@@ -209,8 +209,8 @@ def reached(arms: ArmsBeside) -> float:
 @dataclass(frozen=True)
 class Fitted:
     """The best fit of a ``law`` to the quantities of cubes named in ``to``: its ``parameters`` by name with the published range,
-    None where none is known, and the ``values`` of all quantities by name; ``converged``: True where the fit ended at a least sum
-    of squares, False where its ``evaluations`` ran out before.
+    None if none is known, and the ``values`` of all quantities by name; ``converged``: True if the fit ended at a least sum of
+    squares, False if its ``evaluations`` ran out before.
     """
 
     law: str
@@ -222,14 +222,14 @@ class Fitted:
 
     @property
     def inside(self) -> bool | None:
-        """True where every parameter with a published range is inside it; None where none has one."""
+        """True if every parameter with a published range is inside this range; None if no parameter has one."""
         known = [low <= value <= high for value, found in self.parameters.values() if found for low, high in [found]]
         return all(known) if known else None
 
 
 @dataclass(frozen=True, eq=False)
 class Credibility:
-    """The evidence of all quantities: ``rows``, moment ``arms``, by case the reason why some are ``missing``, and ``fits`` of laws
+    """The evidence of all quantities: ``rows``, moment ``arms``, by case the reason why arms are ``missing``, and ``fits`` of laws
     to the cubes.
     """
 

@@ -1,4 +1,4 @@
-"""Sizes of differences between two runs; where the difference is small by chance, its average over frames or statistics counts."""
+"""Sizes of differences between two runs; if a difference is small by chance, its average over frames or statistics counts."""
 
 import math
 
@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 from fem_reference.foundations.mesh import Floats, enclosed_volume
 from fem_reference.runs.store import Run
 
-# Prefixes of statistics that are the value at one place, each with that of the average over places.
+# Prefixes of statistics that are the value at one place, each with the prefix of the average over places.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
-_LEAST = 0.5  # averages of changes count as differing by at least this share of the runs' distance: less is chance
+_LEAST = (
+    0.5  # averages of changes differ by at least this share of the distance of the runs: a smaller difference is chance
+)
 _MOVED = 0.01  # below this share of a surface's greatest motion, ratios to the motion have no meaning
 
 
@@ -21,7 +23,9 @@ def greatest(values: Floats) -> float:
 
 
 def ratio(differences: Floats, scale: Floats) -> float:
-    """The root mean square of ``differences`` (f,) over that of ``scale`` (f,), where both are known; NaN where the scale is 0."""
+    """The root mean square of ``differences`` (f,) over that of ``scale`` (f,), in frames in which both are known; NaN if the scale
+    is 0.
+    """
     known = np.isfinite(differences) & np.isfinite(scale)
     squares = float(scale[known] @ scale[known])
     return math.sqrt(float(differences[known] @ differences[known]) / squares) if squares > 0 else math.nan
@@ -29,11 +33,11 @@ def ratio(differences: Floats, scale: Floats) -> float:
 
 def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> Floats:
     """The size (f,) of signed ``differences`` (f,) of a statistic between two runs whose surfaces are ``apart`` (f,) [mm]: at least
-    the distance times the average ratio of difference to distance over the frames. A difference that crosses zero is no evidence
-    of a small error there; where the surfaces are equal the size is 0.
+    the distance times the average ratio of difference to distance over the frames. A difference that crosses zero is no evidence of
+    a small error in that frame. If the surfaces are equal the size is 0.
 
     If the motion ``moved`` (f,) [mm] of the surfaces is given, the distance counts as at least the motion times the median ratio
-    of distance to motion: by chance two meshes agree better in some poses than in others.
+    of distance to motion: in some poses two meshes agree better by chance.
     """
     size = apart
     if moved is not None:
@@ -44,7 +48,7 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
 
 def together(parts: dict[str, Floats], there: NDArray[np.bool_]) -> tuple[Floats, dict[str, float]]:
     """The bar (f,) of independent causes from its ``parts`` (f,) by cause, and the greatest value of each part over the frames
-    ``there`` (f,), or over all frames where there are none of these.
+    ``there`` (f,), or over all frames if this is empty.
     """
     greatest = {name: float((part[there] if there.any() else part).max()) for name, part in parts.items()}
     return np.sqrt(np.sum([part**2 for part in parts.values()], axis=0)), greatest
@@ -55,10 +59,10 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
     least the ``deviations`` (f,) of the runs from each other times the average ratio of difference to deviation, over the frames
     and the statistics of the metric, and at least half the deviation for averages over places.
 
-    By the triangle inequality, changes of the same places differ by at most their deviation, and by less as most of it is not
-    along the displacement or cancels. One statistic alone does not show how much less: its difference may be small by chance,
-    most of all that of the worst place. A quantile or a greatest value belongs to one place, wherever it is: nothing cancels
-    there, and no quantile of the deviation bounds it. So its difference counts as at least the root mean square distance of places.
+    By the triangle inequality, changes of the same places differ by at most their deviation. They differ by less, as most of the
+    deviation is not along the displacement, or cancels. A single statistic does not show by how much less: its difference may be
+    small by chance, most of all at the worst place. A quantile or a greatest value belongs to one place, wherever it is: nothing
+    cancels there, and no quantile of the deviation bounds it. So its difference counts as at least the rms distance of places.
     """
     metrics = [metric for metric, _ in names]
     shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]
@@ -82,7 +86,7 @@ def carried(run: Run, moved: Floats) -> dict[str, Floats]:
     """Errors (f,) of the volume that the surface of a ``run`` encloses, by statistic. Its tetrahedra carry the surface, which lies
     partly outside them: the error is the difference of the changes of both volumes. Empty for a run without tetrahedra.
 
-    It may cross zero: it counts as at least its average share of the surface's motion ``moved`` (f,) [mm].
+    The error may cross zero: it counts as at least its average share of the surface's motion ``moved`` (f,) [mm].
     """
     inside = run.scalars.get("volume_ratio")
     if inside is None:

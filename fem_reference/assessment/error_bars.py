@@ -1,8 +1,9 @@
 """Error bars of every statistic, frame by frame, from further solutions of the reference with coarser numerics.
 
-There are two sorts of bars. That of a candidate's deviation from the reference is the deviation of the reference's runs from each
-other: by the triangle inequality, another reference changes the deviation by at most that. That of the reference's own change from
-rest is the share of these deviations by which the changes of its runs differ. The bars of a body are differences of its states.
+There are two sorts of bars. The bar of a candidate's deviation from the reference is the deviation of the reference's runs from
+each other: by the triangle inequality, another reference changes the candidate's deviation by at most this amount. The bar of the
+reference's change from rest is the share of these deviations by which the changes of its runs differ. The bars of a body are
+differences of its states.
 """
 
 import json
@@ -28,17 +29,17 @@ FILE = "error_bar.json"
 FORMAT = 2
 # The safety factor of a grid convergence index (Roache 1998, Verification and Validation in Computational Science, ch. 5).
 SAFETY = 1.25
-# An additional factor for a single fibre: nothing averages there, and two sizes are weaker evidence than three (Roache takes 3
-# for two). Chosen so that bars cover the differences from finer solutions (docs/error_bars.md).
+# An additional factor for a single fibre: nothing averages out, and two sizes are weaker evidence than three (for two sizes Roache
+# takes 3). It was chosen so that bars cover the differences from finer solutions (docs/error_bars.md).
 LONE_FIBRE = 1.2
 # The remaining error, of first order, over the change of the result when its cause is halved. For the cells of a body this is the
 # least order away from rims of constraints, for any element (docs/error_bars.md).
 VARIATION = 2.0
-# The order of an error in the size of tetrahedra: in general, and at the worst place. Rims of attachments, where
-# displacement grows with the square root of the distance, give order 1, and 2 only with a mesh graded towards them; all
-# other places give 2 or more. The general order is between, as three sizes in a row show too (docs/error_bars.md).
+# The order of an error in the size of tetrahedra: in general, and at the worst place. Rims of attachments, where displacement grows
+# with the square root of the distance, give order 1, or 2 with a mesh graded towards them; all other places give 2 or more. The
+# general order is in between, as runs with three sizes also show (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
-# The share of a force or moment that changes where the same springs are spread over facets instead of points of the surface:
+# The relative change of a force or moment if the same springs are spread over facets instead of points of the surface:
 # 5.3 and 8.8 % of the force on the femur at 1 rad, of gluteus_medius and gluteus_maximus.
 SPREAD = 0.09
 TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
@@ -53,12 +54,12 @@ _Differences = dict[Of, list[Floats]]
 
 @dataclass(frozen=True, eq=False)
 class ErrorBar:
-    """The error bar of one statistic: its possible error due to the reference, ``values`` (f,) in ``unit``, NaN
-    where unknown. It is ``of`` the reference's own change from rest or of a candidate's deviation from the reference. ``parts``: by
-    cause, its greatest contribution over the frames.
+    """The error bar of one statistic: its possible error due to the reference, ``values`` (f,) in ``unit``, NaN if unknown. ``of``:
+    the reference's change from rest, or a candidate's deviation from the reference. ``parts``: by cause, its greatest contribution
+    over the frames.
 
-    ``model`` (f,): the change of the statistic by another model of attachments that are springs: by exact ones where these were
-    solved, of a force or moment at least ``SPREAD`` of it. That is no error of this model, so ``values`` leave it out.
+    ``model`` (f,): the change of the statistic by another model of spring attachments: by exact attachments if these were solved,
+    and for a force or moment at least ``SPREAD`` of its value. This is no error of the present model, so ``values`` leave it out.
     """
 
     of: Of
@@ -77,8 +78,8 @@ class ErrorBar:
 
 @dataclass(frozen=True, eq=False)
 class ErrorBars:
-    """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of two ``sizes`` [mm], the reference's own first,
-    and the general ``order`` that is assumed of the error in them.
+    """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of two ``sizes`` [mm], those of the reference
+    first, with a general ``order`` assumed for the error in the size.
     """
 
     numbers: tuple[int, ...]
@@ -87,7 +88,7 @@ class ErrorBars:
     bars: tuple[ErrorBar, ...]
 
     def find(self, of: Of, metric: str, statistic: str) -> ErrorBar | None:
-        """The bar of a statistic, ``of`` a change or a deviation; None where there is none."""
+        """The bar of a statistic, ``of`` a change or a deviation; None if there is none."""
         wanted = (of, metric, statistic)
         return next((bar for bar in self.bars if (bar.of, bar.metric, bar.statistic) == wanted), None)
 
@@ -101,9 +102,9 @@ class ErrorBars:
 @dataclass(frozen=True, eq=False)
 class Pair:
     """Runs of the reference over the same frames: ``fine`` is the reference itself, ``coarse`` has larger tetrahedra, each of
-    ``varied`` is ``coarse`` with one cause of error halved, by name, and ``exact`` has exact attachments in place of springs.
+    ``varied`` is ``coarse`` with one cause of error halved, by name, and ``exact`` has exact attachments instead of springs.
 
-    ``sizes`` [mm]: those of the tetrahedra; ``safety``: the factor of bars over the expected error; ``springs``: True where some
+    ``sizes`` [mm]: the sizes of the tetrahedra; ``safety``: the factor of bars over the expected error; ``springs``: True if some
     attachment is by springs.
     """
 
@@ -116,7 +117,7 @@ class Pair:
     springs: bool = False
 
     def share(self, metric: str, statistic: str) -> float:
-        """The error of the fine run over the difference of the two, with the safety factor of a grid convergence index."""
+        """The error of the fine run over the difference of the two runs, with the safety factor of a grid convergence index."""
         stated = described()[metric, statistic]
         order = ORDER_OF_WORST if stated.local else ORDER
         safety = self.safety * (LONE_FIBRE if stated.lone else 1.0)
@@ -124,7 +125,7 @@ class Pair:
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
-    """The bars of changes and deviations, for every statistic of every metric except those of a run itself, which are exact."""
+    """The bars of changes and deviations, for every statistic of every metric, except metrics of a run itself, which are exact."""
     comparing = [name for name in names() if not of_itself(name)]
     surface = cache(as_surface)
 
@@ -133,8 +134,8 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
         return change(run, context, comparing) if other is None else measure(run, other, context, comparing)
 
     def differences(run: Run, other: Run) -> _Differences:
-        """Differences of two runs: of their changes from rest, each with its interior fibres, and the deviations of the surface of
-        the ``other`` from that of ``run``.
+        """Differences of two runs: the differences of their changes from rest, each with its interior fibres, and the deviations of
+        the surface of the ``other`` run from the surface of ``run``.
         """
         against_run, against_itself = (measured(surface(other), surface(one)) for one in (run, other))
         changes = _less(measured(run, None), measured(other, None))
@@ -161,8 +162,8 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
 
 
 def _model(one: Measure, exact: Floats | None, own: Floats | None) -> Floats | None:
-    """The change (f,) of the statistic ``one`` by another model of springs: by ``exact`` attachments, where known, and of the
-    reference's ``own`` force or moment by springs that are spread in another way.
+    """The change (f,) of the statistic ``one`` by another model of springs: by ``exact`` attachments, if known, and for the
+    reference's ``own`` force or moment also by springs that are spread in another way.
     """
     forces = one.metric == "joint_moment" and one.statistic != "arm"
     spread = SPREAD * np.abs(own) if forces and own is not None else None
@@ -184,8 +185,8 @@ def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Fl
 def _averaged(
     sizes: list[Floats], kinds: list[tuple[str, str]], spreads: dict[tuple[str, str], Floats]
 ) -> list[Floats]:
-    """The ``sizes`` (f,) of differences by metric and statistic; of a signed mean over fibres at least the root mean square of
-    their deviations, which ``spreads`` have: errors of neighbouring fibres are alike, and cancel in a pair of runs only by chance.
+    """The ``sizes`` (f,) of differences by metric and statistic; for a signed mean over fibres at least the root mean square of
+    their deviations, given in ``spreads``: errors of neighbouring fibres are similar, and cancel in a pair of runs only by chance.
     """
     found = []
     for size, (metric, statistic) in zip(sizes, kinds, strict=True):
@@ -222,7 +223,7 @@ def save(bars: ErrorBars, folder: Path, of: dict[str, str]) -> None:
 
 
 def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
-    """The bars stored in ``folder``; None where there are none that match ``of``, InputError where the file is damaged."""
+    """The bars stored in ``folder``; None if there are none that match ``of``, InputError if the file is damaged."""
     place = folder / FILE
     if not place.exists():
         return None
@@ -243,8 +244,8 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
 class BodyBars:
     """Error bars of a body at ``frames`` (f,): distances from its states on ever finer cells of the same shape. ``points`` (f, n)
     [mm], ``energy`` (f,) [N mm], and by name of each constraint or bone the vectors ``forces`` (f,) [N] and ``moments`` (f,)
-    [N mm]; NaN where unknown. ``displacement`` (f,) is the bar of the displacement over the displacement, both rms over the
-    nodes; ``sharper`` describes the more accurate solution.
+    [N mm]; NaN if unknown. ``displacement`` (f,): the bar of the displacement over the displacement, both rms over the nodes.
+    ``sharper``: the more accurate solution, in words.
     """
 
     frames: tuple[float, ...]
@@ -258,8 +259,8 @@ class BodyBars:
 
 def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints, sharper: str) -> BodyBars:
     """The bars of the ``states`` of a body, the rest state first, from the ``finer`` states of a more accurate solution, which may
-    be fewer. ``shared`` (n,): the number of each point of the body in that solution, -1 for a point that it lacks; ``sharper``:
-    its differences in numerics, in words.
+    be fewer. ``shared`` (n,): the number of each point of the body in that solution, -1 for a missing point; ``sharper``: its
+    differences in numerics, in words.
     """
     there = {state.number: state for state in finer}
     pairs = [(state, _beside(state, there.get(state.number), shared)) for state in states]
@@ -280,7 +281,7 @@ def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints,
 
 
 def _beside(state: Frame, other: Frame | None, shared: Ints) -> Frame:
-    """The ``other`` state at the points of ``state``, NaN where it has none or was not reached."""
+    """The ``other`` state at the points of ``state``, NaN for missing points or if it was not reached."""
     if other is None:
         lost = np.full(3, np.nan)
         blank: dict[str, Any] = {kind: dict.fromkeys(getattr(state, kind), lost) for kind in ("forces", "moments")}

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class CurveError:
-    """A ``technique`` through ``known`` points of each fibre: distances [mm] of the others from its curve, rms and greatest."""
+    """A ``technique`` through ``known`` points of each fibre: distances [mm] of other points from its curve, rms and greatest."""
 
     case: str
     technique: str
@@ -41,14 +41,14 @@ class FitError:
 
     @property
     def fewer(self) -> float:
-        """The ratio of the numbers that define the vertices to those that define the Gaussians."""
+        """The ratio of the count of numbers that define the vertices to the count that define the Gaussians."""
         return 3 * self.vertices / (4 * self.gaussians)
 
 
 @dataclass(frozen=True)
 class DecompositionError:
-    """Fibres of a ``source`` beside those of ``against``: the angle between them [degrees], median and 95th percentile, the
-    ratio of their mean lengths, the share of points ``outside`` the muscle, and the pairs of fibres that cross.
+    """Fibres of a ``source`` compared with the fibres of ``against``: the angle between them [degrees], median and 95th percentile,
+    the ratio of their mean lengths, the share of points ``outside`` the muscle, and the pairs of fibres that cross.
     """
 
     case: str
@@ -63,8 +63,8 @@ class DecompositionError:
 
 @dataclass(frozen=True)
 class RodError:
-    """A muscle as ``rods`` of one ``radius`` [mm] along its fibres, together of its volume, as ``viper`` has them at rest: the
-    share of the muscle that is ``filled``, that of the rods that is ``outside``, and that in which they ``overlap``.
+    """A muscle as ``rods`` of one ``radius`` [mm] along its fibres, with the muscle's volume in total, as in ``viper`` at rest: the
+    share of the muscle that is ``filled``, and the shares of the rods that are ``outside`` or ``overlap``.
     """
 
     case: str
@@ -77,8 +77,8 @@ class RodError:
 
 @dataclass(frozen=True)
 class AnswerChange:
-    """The change of the reference's answer with fibres of a ``source`` in place of those of ``against``: by ``metric.statistic``
-    the greatest over the frames, empty where a solution is missing (``status``); ``bars``: the error bars of the answer.
+    """The change of the reference's result with fibres of a ``source`` instead of ``against``: by ``metric.statistic`` the greatest
+    over the frames, empty if a solution is missing (``status``); ``bars``: the error bars of the result.
     """
 
     case: str
@@ -91,7 +91,7 @@ class AnswerChange:
 
 @dataclass(frozen=True)
 class Estimation:
-    """The errors of all techniques; ``missing``: by case, the reason of omission; ``answers``, where these were asked for."""
+    """The errors of all techniques; ``missing``: by case, the reason of omission; ``answers``, if these were requested."""
 
     curves: tuple[CurveError, ...]
     heights: tuple[HeightError, ...]

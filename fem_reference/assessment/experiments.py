@@ -22,7 +22,7 @@ _Text = Annotated[str, StringConstraints(min_length=1)]
 
 
 class Fact(Record):
-    """A measured number: ``value`` in ``unit``, its standard deviation ``sd`` over ``n`` specimens where known, the way in which it
+    """A measured number: ``value`` in ``unit``, its standard deviation ``sd`` over ``n`` specimens if known, the way in which it
     was taken from the publication (``how``), and the kind of text in which it was read (``read_in``).
     """
 
@@ -40,14 +40,14 @@ class Fact(Record):
 
     @property
     def validates(self) -> bool:
-        """True where it was read in the publication or its abstract and has a deviation over several specimens."""
+        """True if it was read in the publication or its abstract and has a deviation over several specimens."""
         read = self.read_in in ("publication", "abstract") and self.how not in ("fit", "memory")
         return read and self.sd is not None and (self.n or 0) > 1
 
 
 class Experiment(Record):
     """An experiment of a ``kind``: measurement, model, or bands (numbers of several publications). Its ``specimen``, its
-    ``boundary`` conditions, the parts that our scene repeats and does not repeat; ``file``: a whole curve, in the folder of
+    ``boundary`` conditions, the parts that our scene repeats and does not repeat; ``file``: a full curve, in the folder of
     ``FEM_REFERENCE_DATA``.
     """
 
@@ -62,7 +62,7 @@ class Experiment(Record):
 
 
 def facts(folder: Path = FOLDER) -> Iterator[Fact]:
-    """Every measured number of a ``folder``; InputError, with the line, where one is incomplete."""
+    """Every measured number of a ``folder``; InputError, with the line, if a number is incomplete."""
     with (folder / NAME).open(encoding="utf-8", newline="") as file:
         for line, row in enumerate(csv.DictReader(file, strict=True), 2):
             yield _fact(row, f"{NAME}:{line}")
@@ -107,13 +107,13 @@ def model_band(quantity: str = "mean_surface_distance") -> tuple[Fact, ...]:
 
 
 def ratio(upper: Fact, lower: Fact) -> tuple[float, float]:
-    """The ratio of two facts, and its standard deviation as if they were independent; NaN where one has none."""
+    """The ratio of two facts, and its standard deviation as if they were independent; NaN if one of them has no deviation."""
     value = upper.value / lower.value
     parts = [math.nan if one.sd is None else one.sd / one.value for one in (upper, lower)]
     return value, abs(value) * math.hypot(*parts)
 
 
 def least_specimens(several: Iterable[Fact]) -> int | None:
-    """The least number of specimens of ``several`` facts; None where one is unknown."""
+    """The least number of specimens of ``several`` facts; None if one is unknown."""
     counts = [one.n for one in several]
     return None if None in counts or not counts else min(one for one in counts if one is not None)

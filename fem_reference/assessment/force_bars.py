@@ -1,7 +1,7 @@
 """Error bars of the force on each bone and of its moment about the origin, as lengths of vectors.
 
-The rule is that of ``joint_moment``. The difference of two runs is the length of the difference of their vectors, so that no
-component has a short bar where it crosses zero. Two bones between which a muscle is in balance have the same bars.
+The rule is the same as for ``joint_moment``. The difference of two runs is the length of the difference of their vectors, so no
+component has a short bar as it crosses zero. Two bones between which a muscle is in balance have the same bars.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ _UNITS = {"force": "N", "moment": "N mm"}
 
 
 def force_bars(pair: Pair, context: MeasurementContext) -> tuple[ErrorBar, ...]:
-    """The bars of ``force_on_bone`` and ``moment_on_bone`` of the reference, by bone; none where no force is known."""
+    """The bars of ``force_on_bone`` and ``moment_on_bone`` of the reference, by bone; none if no force is known."""
     moved = _apart(at_rest(pair.fine), pair.fine, context)
     others = {TETRAHEDRA: (pair.coarse, pair.fine)} | {name: (run, pair.coarse) for name, run in pair.varied.items()}
     apart = {name: _apart(*runs, context) for name, runs in others.items()}
@@ -46,6 +46,6 @@ def _apart(run: Run, other: Run, context: MeasurementContext) -> Floats:
 
 
 def _length(kind: str, bone: str, run: Run, other: Run | None = None) -> Floats:
-    """The length (f,) of the force or moment on a ``bone``, or of its difference from that of an ``other`` run."""
+    """The length (f,) of the force or moment on a ``bone``, or of its difference from an ``other`` run."""
     vectors = [one.force(bone) if kind == "force" else one.moment(bone) for one in (run, other) if one is not None]
     return np.asarray(np.linalg.norm(vectors[0] - (vectors[1] if other else 0.0), axis=1))

@@ -25,7 +25,7 @@ COSTS: dict[str, tuple[str, str]] = {
     "projections": ("projections of a constraint", ""),
     "peak_memory_mb": ("peak memory", "MB"),
 }
-# The cost that is the share of the machine kept busy by other processes during a run, and the share from which it slows a run.
+# The name of the cost that is the share of the machine used by other processes during a run, and the share that slows a run.
 LOAD, LOADED = "load_by_others", 0.1
 # The keys of a scene that define its tetrahedra.
 TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
@@ -38,10 +38,9 @@ _LEAST_POINTS, _LEAST_SPAN = 2, 1.3
 @dataclass(frozen=True)
 class Point:
     """A ``solver`` with settings, run on a ``case``: the varied key (``knob``, "" for the settings of the case or the default)
-    and its ``value`` as text; ``choice``: everything needed to repeat it; its outcome.
-
-    ``errors``: by ``metric.statistic``, the greatest magnitude over the frames of the deviation from the truth; ``costs``: by
-    name, those of ``COSTS`` that it has, and seconds by phase.
+    and its ``value`` as text; ``choice``: everything needed to repeat it; its outcome. ``errors``: by ``metric.statistic``, the
+    greatest magnitude over the frames of the deviation from the truth; ``costs``: the known ones of ``COSTS`` by name, and seconds
+    by phase.
     """
 
     case: str
@@ -57,38 +56,33 @@ class Point:
 
     @property
     def is_default(self) -> bool:
-        """True where nothing was varied."""
+        """True if nothing was varied."""
         return not self.knob
 
     @property
     def is_truth(self) -> bool:
-        """True for the case's own reference, against which all others are measured."""
+        """True for the reference of the case, against which all others are measured."""
         return self.name == "reference" and self.is_default
 
     @property
     def label(self) -> str:
-        """The words that distinguish it from the other points of its solver."""
+        """The words that distinguish the point from the other points of its solver."""
         name = "" if self.name in (self.solver, "reference") else f"{self.name}, "
         return f"{name}{self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
 
     @property
     def load(self) -> float:
-        """The share of the machine that other processes kept busy during its run; NaN where that is not known."""
+        """The share of the machine that other processes kept busy during its run; NaN if that is not known."""
         return self.costs.get(LOAD, math.nan)
 
-    @property
-    def is_loaded(self) -> bool:
-        """True where its time was measured on a machine that was busy with other work."""
-        return self.load > LOADED
-
     def at(self, error: str, cost: str) -> tuple[float, float] | None:
-        """Its error and its cost, None where one is not known or not above zero."""
+        """Its error and its cost, None if one is not known or not above zero."""
         pair = self.errors.get(error, math.nan), self.costs.get(cost, math.nan)
         return pair if self.status == "converged" and min(pair) > 0 and all(map(math.isfinite, pair)) else None
 
 
 def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
-    """The points that no other one beats in both error and cost, the cheapest first."""
+    """The points that no other point beats in both error and cost, the cheapest first."""
     known = [(pair[1], pair[0], i, point) for i, point in enumerate(points) if (pair := point.at(error, cost))]
     found, best = list[Point](), math.inf
     for _, value, _, point in sorted(known):
@@ -100,9 +94,9 @@ def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
 
 @dataclass(frozen=True)
 class Price:
-    """The price of accuracy of a ``solver``: ``factor``, the cost at half an error over the cost at the error, on its front, NaN
-    where more cost does not reduce the error; the ``best`` and ``worst`` errors of the front, which has ``count`` points;
-    ``nearest``: the point with the best error.
+    """The price of accuracy of a ``solver``: ``factor``, the cost at half an error over the cost at the error, on its front, NaN if
+    more cost does not reduce the error; the ``best`` and ``worst`` errors of the front, which has ``count`` points; ``nearest``:
+    the point with the best error.
     """
 
     solver: str
@@ -114,12 +108,12 @@ class Price:
 
     @property
     def is_measured(self) -> bool:
-        """True where the front spans half the error, so that its factor is no extrapolation."""
+        """True if the front includes half the error, so that its factor is no extrapolation."""
         return self.worst >= 2 * self.best
 
 
 def price(points: Iterable[Point], solver: str, error: str, cost: str) -> Price | None:
-    """The price of a ``solver``: a line through its front in logarithms, by least squares; None where it is unknown."""
+    """The price of a ``solver``: a line through its front in logarithms, by least squares; None if it is unknown."""
     front = pareto((point for point in points if point.solver == solver), error, cost)
     pairs = [pair for point in front if (pair := point.at(error, cost))]
     if not pairs:
@@ -147,7 +141,9 @@ class Match:
 
 
 def match(points: Iterable[Point], error: str, cost: str, *, same: str, at: float) -> Match:
-    """The best point of each solver whose error or cost ``same`` is at most ``at``; of equally good ones that with less of it."""
+    """The best point of each solver whose error or cost ``same`` is at most ``at``; among equally good points the one with less of
+    it.
+    """
     i = 0 if same == error else 1
     known = [(pair, point) for point in points if (pair := point.at(error, cost)) and pair[i] <= at]
     best = dict[str, Point]()

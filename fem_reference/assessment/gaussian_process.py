@@ -1,9 +1,9 @@
 """A Gaussian process: a function of a few uniform variables from its values in runs, and its sensitivities.
 
-It has a linear trend and a squared exponential covariance with a length scale for each variable. The lengths and
-the noise maximise the profile likelihood (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sections 2.7 and
-5.4.1), with the optimal trend and one optimal variance of all outputs. Sobol's indices are estimated by sampling: first-order ones
-as in Saltelli et al. 2010 (doi 10.1016/j.cpc.2009.09.018), total ones as in Jansen 1999.
+The process has a linear trend and a squared exponential covariance with a length scale for each variable. The lengths and the noise
+maximise the profile likelihood (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sections 2.7 and 5.4.1), with
+the optimal trend and one optimal variance of all outputs. Sobol's indices are estimated by sampling: first-order indices as in
+Saltelli et al. 2010 (doi 10.1016/j.cpc.2009.09.018), total indices as in Jansen 1999.
 """
 
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ class GaussianProcess:
     """The process through outputs (n, q) at ``points`` (n, d) from -1 to 1: logarithms of the length of each variable and of the
     noise (``logs`` (d + 1,)), the ``trend`` (1 + d, q) and the ``weights`` (n, q) of the points.
 
-    ``error``: the mean square of the error at runs left out of the whole fit, lengths too, as a share of the outputs' variance.
+    ``error``: the mean square error at runs left out of the fit, including that of lengths, as a share of the outputs' variance.
     """
 
     points: Floats
@@ -48,7 +48,7 @@ class GaussianProcess:
 
     @property
     def total(self) -> Floats:
-        """The share (d,) of the variance by each variable alone and with others."""
+        """The share (d,) of the variance by each variable, alone and with others."""
         return np.asarray(self._shares[1])
 
     @cached_property
@@ -68,7 +68,7 @@ class GaussianProcess:
 
 
 def fit(points: Floats, outputs: Floats) -> GaussianProcess | None:
-    """The process of ``outputs`` (n, q) at ``points`` (n, d) from -1 to 1, with its error; None where the outputs do not vary.
+    """The process of ``outputs`` (n, q) at ``points`` (n, d) from -1 to 1, with its error; None if the outputs do not vary.
 
     >>> points = np.linspace(-1, 1, 12)[:, None]
     >>> float(fit(points, np.sin(3 * points))(np.array([[0.5]]))[0, 0].round(3))

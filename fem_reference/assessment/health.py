@@ -22,11 +22,11 @@ from fem_reference.problems.setup import Bone
 @dataclass(frozen=True, eq=False)
 class Followed:
     """A run whose health is measured. ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame
-    ``numbers``; for a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3); the ``bones``, with which vertices
-    that are ``free`` (n,) may be in contact; ``truth`` (f, n, 3), the vertices of the reference, where they are the same;
-    ``integrated`` (f,), V/V0 from the solver itself; ``negative_modes`` (f,), ``material_modes`` (f,), those of them that the
-    material certainly has, and ``least_determinant`` (f,), the least det F, where known; or a scalar field's ``values`` (f, N)
-    and the ``range`` of its boundary values. ``spans``: the parts that are of each body, where there are several.
+    ``numbers``; for a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3). ``bones``: bones with which ``free``
+    (n,) vertices may be in contact. ``truth`` (f, n, 3): the same vertices in the reference, if it has them. ``integrated`` (f,):
+    V/V0 from the solver. If known, ``negative_modes`` (f,), ``material_modes`` (f,), the negative modes that the material certainly
+    has, and ``least_determinant`` (f,), the least det F. For a scalar field its ``values`` (f, N) and the ``range`` of its boundary
+    values. ``spans``: the parts of each of several bodies.
     """
 
     numbers: tuple[int, ...]
@@ -47,7 +47,7 @@ class Followed:
 
     @cached_property
     def bodies(self) -> "tuple[Followed, ...]":
-        """The run of each body; the run itself where there is only one."""
+        """The run of each body; the run itself if there is only one body."""
         return tuple(map(self._of, self.spans)) or (self,)
 
     def _of(self, span: Span) -> "Followed":
@@ -70,12 +70,12 @@ class Followed:
 
 _LOOKS = 33  # the number of positions of a vertex that are sampled on its path from a frame to the next
 
-# Values (f,), and words (f,) and points (f, 3) of the worst place, the last two None where there is no particular place.
+# Values (f,), and words (f,) and points (f, 3) of the worst place, the last two None if there is no particular place.
 Found = tuple[Floats, list[str] | None, Floats | None]
 
 
 def volume(run: Followed) -> Found:
-    """Change of the enclosed volume, in per cent of that at rest; of several bodies the greatest."""
+    """Change of the enclosed volume, in per cent of the volume at rest; for several bodies the greatest change."""
     if run.spans:
         changes = np.array([volume(one)[0] for one in run.bodies])
         return np.max(changes, axis=0), None, None
@@ -88,7 +88,7 @@ def volume(run: Followed) -> Found:
 
 def inside_out(run: Followed) -> Found:
     """Inverted share: of the tetrahedra, if any, in per cent of the volume at rest, else of the surface in per cent of its area.
-    For curved elements, whose corners do not show inversion, it is 0 or 100 by the least det F.
+    For curved elements, whose corners do not show inversion, the share is 0 or 100 by the least det F.
     """
     if run.least_determinant is not None:
         words = [f"det F is at least {value:.2g}" for value in run.least_determinant]
@@ -122,12 +122,12 @@ def from_first(run: Followed) -> Found:
 
 
 def from_reference(run: Followed) -> Found:
-    """Greatest distance of a vertex from that of the reference, in per cent of the body's size; NaN without a reference."""
+    """Greatest distance of a vertex from the vertex in the reference, in per cent of the body's size; NaN without a reference."""
     return _off(run, np.full(run.positions.shape, np.nan) if run.truth is None else run.truth)
 
 
 def stretch(run: Followed) -> Found:
-    """The greatest stretch of an edge of the surface, over that at rest."""
+    """The greatest stretch of an edge of the surface, relative to rest."""
     edges = np.unique(np.sort(run.surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     states = np.concatenate([run.surface.points[None], run.positions])
     rest, *lengths = np.linalg.norm(states[:, edges[:, 1]] - states[:, edges[:, 0]], axis=2)
@@ -148,7 +148,7 @@ def penetration(run: Followed) -> Found:
 
 def passed(run: Followed) -> Found:
     """Greatest depth of a free vertex inside a bone on its straight path, relative to the bone, from the previous frame, in per
-    cent of the body's size: it shows a bone that crosses the body and is outside of it at both frames.
+    cent of the body's size. It detects a bone that crosses the body and is outside in both frames.
     """
     depths = np.zeros(run.positions.shape[:2])
     for bone in run.bones:
@@ -169,7 +169,7 @@ def _deepest(run: Followed, depths: Floats) -> Found:
 
 
 def pierced(run: Followed) -> Found:
-    """Greatest depth of a vertex of a bone inside the body, in per cent of its size, as thin bones fit between its vertices."""
+    """Greatest depth of a vertex of a bone in the body, in per cent of its size; thin bones fit between vertices of the body."""
     values, places = np.zeros(len(run.numbers)), np.tile(run.surface.points[0], (len(run.numbers), 1))
     for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
         body = run.surface.moved_to(points)
@@ -183,8 +183,8 @@ def pierced(run: Followed) -> Found:
 
 
 def crossed(run: Followed) -> Found:
-    """Greatest depth to which bodies, or parts of one body, penetrate each other, in per cent of the size: 0 where an exact test
-    finds that no triangles of their surfaces intersect; of one body, no triangles that do not intersect at rest already.
+    """Greatest depth to which bodies, or parts of one body, penetrate each other, in per cent of the size: 0 if an exact test finds
+    no intersecting triangles of their surfaces; for one body, none that do not already intersect at rest.
     """
     values, places = np.full(len(run.numbers), np.nan), np.tile(run.surface.points[0], (len(run.numbers), 1))
     for i, finite in enumerate(np.isfinite(run.positions).all(axis=(1, 2))):
@@ -222,7 +222,7 @@ QUANTITIES: dict[str, Callable[[Followed], Found]] = {one.__name__: one for one 
 
 
 def unstable(run: Followed) -> str:
-    """The frames in which a run is an unstable equilibrium, in words; empty where there are none or modes were not counted."""
+    """The frames in which a run is an unstable equilibrium, in words; empty if there are none or modes were not counted."""
     if run.negative_modes is None or not (run.negative_modes > 0).any():
         return ""
     first, most = int(np.argmax(run.negative_modes > 0)), run.negative_modes.max()

@@ -36,7 +36,7 @@ _LOW = 0.1  # det F below which a state is hardly valid
 @dataclass(frozen=True)
 class Verdict:
     """The verdict on an expectation: the ``word``, the decisive ``value`` in ``unit`` at ``frame``, and the ``error_bar`` of the
-    reference in that frame, NaN where it is unknown and None where there are no bars.
+    reference in that frame, NaN if it is unknown and None if there are no bars.
     """
 
     word: Word
@@ -50,7 +50,7 @@ class Verdict:
 
 
 def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> Word:
-    """Pass if ``abs(value - truth) <= within`` for every truth within its ``error_bar``, fail if for no such truth, else
+    """Pass if ``abs(value - truth) <= within`` for every truth within its ``error_bar``, fail if this holds for no such truth, else
     inconclusive (all four in one unit). A value that is not a number fails; an unknown truth, tolerance or bar is inconclusive.
 
     >>> judge(1.02, 1.0, 0.05), judge(float("nan"), 1.0, 0.05), judge(1.02, 1.0, 0.05, error_bar=0.04)
@@ -71,7 +71,9 @@ def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> 
 
 
 def overall(words: Iterable[Word]) -> Word:
-    """The combined verdict: the first of fail, inconclusive, doubtful pass and pass among the ``words``; not judged for none."""
+    """The combined verdict: the first of fail, inconclusive, doubtful pass and pass among the ``words``, if any; else not
+    judged.
+    """
     found = set(words)
     order: tuple[Word, ...] = ("fail", "inconclusive", "doubtful pass", "pass")
     return next((word for word in order if word in found), "not judged")
@@ -102,7 +104,7 @@ def doubts(reference: Run) -> list[str]:
 
 
 def doubted(word: Word, doubts: Collection[str]) -> Word:
-    """The verdict ``word`` in view of ``doubts`` about its reference: a doubtful pass in place of a pass."""
+    """The verdict ``word`` in view of ``doubts`` about its reference: a doubtful pass instead of a pass."""
     return "doubtful pass" if word == "pass" and doubts else word
 
 
@@ -151,7 +153,7 @@ def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tupl
     known = [0.0 if bars is None else float(bars[frame]) for frame in frames]
     words = [judge(value, truth, within, bar) for value, bar in zip(values, known, strict=True)]
     word = overall(words)
-    # The first frame that fails decides, else the inconclusive frame with the widest bar, else the frame farthest from the truth.
+    # The first failing frame decides, else the inconclusive frame with the widest bar, else the frame farthest from the truth.
     furthest = max(range(len(values)), key=lambda k: abs(values[k] - truth))
     width = [math.inf if math.isnan(bar) else bar for bar in known]
     widest = max(range(len(values)), key=lambda k: (words[k] == "inconclusive", width[k]))
@@ -162,6 +164,6 @@ def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tupl
 
 
 def in_unit(given: str | float, unit: str) -> float:
-    """A quantity in the ``unit`` of a measure, a bare number only for the unit "1"; ValueError where the dimension differs."""
+    """A quantity in the ``unit`` of a measure, a bare number only for the unit "1"; ValueError if the dimension differs."""
     kind, factor = _KINDS[unit]
     return float(given) if unit == "1" and not isinstance(given, str) else quantity(given, kind) * factor

@@ -12,12 +12,12 @@ from fem_reference.runs.store import Run
 
 @np.errstate(over="ignore", invalid="ignore")
 def to_same_vertex(run: Run, reference: Run) -> Floats:
-    """Distance (f, n) [mm] of each vertex to the same vertex of the reference; NaN where unknown."""
+    """Distance (f, n) [mm] of each vertex to the same vertex of the reference; NaN if unknown."""
     return np.asarray(np.linalg.norm(run.positions - reference.positions, axis=2))
 
 
 def to_surface(run: Run, reference: Run) -> Floats:
-    """Distance (f, n) [mm] of each vertex to the nearest point of the reference's surface, negative inside; NaN where unknown."""
+    """Distance (f, n) [mm] of each vertex to the nearest point of the reference's surface, negative inside; NaN if unknown."""
     found = np.full(run.positions.shape[:2], np.nan)
     for i, (points, others) in enumerate(zip(run.positions, reference.positions, strict=True)):
         if np.isfinite(points).all() and np.isfinite(others).all():
@@ -27,7 +27,7 @@ def to_surface(run: Run, reference: Run) -> Floats:
 
 def to_bones(run: Run, context: MeasurementContext) -> Floats | None:
     """Distance (f, n) [mm] of each vertex to the nearest bone, negative inside, at most ``DISTANCE_MARGIN``; NaN for vertices
-    that are exempt from contact or unknown. None where a bone is not closed: it has no inside.
+    that are exempt from contact or unknown. None if a bone is not closed and so has no inside.
     """
     gaps = np.full(run.positions.shape[:2], DISTANCE_MARGIN)
     try:
@@ -42,7 +42,7 @@ def to_bones(run: Run, context: MeasurementContext) -> Floats | None:
 
 def stretch_along(lines: Polylines, positions: Floats) -> Floats:
     """Stretch (f, m) at the points of ``lines`` moved to ``positions`` (f, m, 3) [mm]: the length of the pieces that meet at a
-    point over that at rest.
+    point over their length at rest.
     """
     count = len(lines.points)
     joined = np.ones(count - 1, bool)  # True where a piece joins a point with the next

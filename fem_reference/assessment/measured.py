@@ -15,7 +15,7 @@ from fem_reference.scenes.muscle import MuscleCase
 
 @dataclass(frozen=True, eq=False)
 class CurrentMeasures:
-    """A candidate as it is now, measured against the ``reference`` with its ``error_bars``, None where unknown."""
+    """A candidate as it is now, measured against the ``reference`` with its ``error_bars``, None if unknown."""
 
     scene: MuscleCase
     candidate: Run
@@ -33,7 +33,7 @@ class CurrentMeasures:
 
     @property
     def points(self) -> Floats:
-        """Positions of the candidate's vertices (f, n, 3) [mm], or of its fibre points where it has no surface."""
+        """Positions of the candidate's vertices (f, n, 3) [mm], or of its fibre points if it has no surface."""
         inside = self.candidate.fibre_positions
         return self.candidate.positions if self.candidate.has_surface or inside is None else inside
 
@@ -45,24 +45,24 @@ class CurrentMeasures:
 
     @property
     def reference_name(self) -> str:
-        """The folder of the reference in the store, named by scene, settings and code; its solver where it has no folder."""
+        """The folder of the reference in the store, named by scene, settings and code; its solver if it has no folder."""
         folder = self.reference.folder
         return self.reference.solver if folder is None else folder.name
 
     @property
     def by_name(self) -> dict[str, Measure]:
-        """The measures by ``metric.statistic``, without those that repeat another in per cent."""
+        """The measures by ``metric.statistic``, without measures that repeat another in per cent."""
         found = {f"{one.metric}.{one.statistic}": one for one in self.measures}
         return {name: one for name, one in found.items() if name.removesuffix("_percent") not in found.keys() - {name}}
 
     def values(self, name: str) -> Floats:
-        """The values (f,) of a ``metric.statistic``, NaN where not finite or not measured for this candidate."""
+        """The values (f,) of a ``metric.statistic``, NaN if not finite or not measured for this candidate."""
         found = metrics.find(self.measures, *name.split("."))
         values = np.full(len(self.reference.numbers), np.nan) if found is None else found.values
         return np.where(np.isfinite(values), values, np.nan)
 
     def bars(self, name: str) -> Floats:
-        """The error bars (f,) of a deviation by ``metric.statistic``, NaN where unknown; a statistic of the run itself is exact."""
+        """The error bars (f,) of a deviation by ``metric.statistic``, NaN if unknown; a statistic of the run itself is exact."""
         metric, statistic = name.split(".")
         if metrics.of_itself(metric):
             return np.zeros(len(self.reference.numbers))

@@ -1,5 +1,5 @@
-"""Moment arms of fibres beside published ones: a polynomial fit of length over angle, the share of poses whose arm is within the
-fibres' range, and the overlap of two ranges.
+"""Moment arms of fibres compared with published arms: a polynomial fit of length over angle, the share of poses whose arm is within
+the fibres' range, and the overlap of two ranges.
 """
 
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ class ArmRange:
     high: Floats
 
     def at(self, angles: Floats) -> "ArmRange":
-        """The range at other ``angles`` (b,) [deg], linear in between; NaN where it does not reach."""
+        """The range at other ``angles`` (b,) [deg], linear in between; NaN beyond its ends."""
         within = (angles >= self.angles.min()) & (angles <= self.angles.max())
         low, high = (np.interp(angles, self.angles, side) for side in (self.low, self.high))
         return ArmRange(angles, np.where(within, low, np.nan), np.where(within, high, np.nan))
@@ -38,7 +38,7 @@ def poses(angles: Floats) -> Floats:
 
 def fitted_arms(angles: Floats, lengths: Floats, at: Floats) -> Floats:
     """``-dl/dangle`` (a, k) [mm] at angles ``at`` (a,) [deg], of the polynomial of fourth degree that fits the ``lengths`` (f, k)
-    [mm] of k fibres at ``angles`` (f,) [deg] best. InputError where too few angles differ.
+    [mm] of k fibres at ``angles`` (f,) [deg] best. InputError if too few angles differ.
     """
     if len(np.unique(np.round(angles, 9))) <= DEGREE:
         raise InputError("angles", f"{len(np.unique(angles))} of them", f"more than {DEGREE} that differ")
@@ -53,7 +53,7 @@ def range_of(angles: Floats, arms: Floats) -> ArmRange:
 
 def share_inside(curve: Floats, found: ArmRange) -> float:
     """The share of poses in which the ``curve`` (a,) [mm] is within the range ``found``, among the poses in which it is known; NaN
-    where it is known in none. A range that is not a number contains nothing.
+    if it is known in no pose. A range of NaN contains nothing.
     """
     known = np.isfinite(curve)
     if not known.any():
@@ -63,7 +63,7 @@ def share_inside(curve: Floats, found: ArmRange) -> float:
 
 
 def overlap(found: ArmRange, published: ArmRange) -> float:
-    """The mean over the poses of the part of the ``published`` range that ``found`` covers; NaN where no pose is known."""
+    """The mean over the poses of the part of the ``published`` range that ``found`` covers; NaN if no pose is known."""
     known = np.isfinite(published.low) & np.isfinite(published.high)
     if not known.any():
         return float("nan")
@@ -74,12 +74,12 @@ def overlap(found: ArmRange, published: ArmRange) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ArmsBeside:
-    """Arms of a muscle's fibres in a run of ``case`` beside a published curve or range of an ``experiment``: at ``angles`` (a,)
-    [deg] the range ``found`` and the mean ``middle`` (a,) [mm] of the fibres, the ``published`` range, whose sides are equal where
-    it is one curve.
+    """Arms of a muscle's fibres in a run of ``case`` compared with a published curve or range of an ``experiment``: at ``angles``
+    (a,) [deg] the range ``found`` and the mean ``middle`` (a,) [mm] of the fibres, and the ``published`` range, whose ends are
+    equal for a curve.
 
-    ``kind``: that of the experiment; ``sense``: the direction of turning of positive arms; ``setting``: the resolution of the run;
-    ``coarser``: the greatest change of the mean arm over the poses [mm] on larger tetrahedra.
+    ``kind``: the kind of the experiment; ``sense``: the direction of rotation for positive arms; ``setting``: the resolution of the
+    run; ``coarser``: the greatest change of the mean arm over the poses [mm] on larger tetrahedra.
     """
 
     case: str
@@ -95,7 +95,7 @@ class ArmsBeside:
 
     @property
     def is_curve(self) -> bool:
-        """True where one curve was published, not a range."""
+        """True if one curve was published, not a range."""
         return bool(np.array_equal(self.published.low, self.published.high, equal_nan=True))
 
     @property

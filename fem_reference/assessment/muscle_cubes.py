@@ -13,7 +13,7 @@ from fem_reference.problems.cubes import FREE, CubeState, loaded
 
 Material = tuple[Effect, ...]
 SQUEEZED, STRETCHED = 0.9, 1.1
-_CLEAR = 0.01  # the share by which a direction must differ in stiffness from others to count as softer or stiffer
+_CLEAR = 0.01  # the share by which the stiffness in a direction must differ to count as softer or stiffer
 # That of the case hip_flexion, after Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 VOLUME = make("incompressible_penalty", bulk="10 MPa")
 FIBRES = {"stress": 0.3, "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
@@ -23,8 +23,8 @@ SHIPPED: Material = (make("neo_hooke", mu=0.01), VOLUME, make("fibre_passive", *
 @dataclass(frozen=True, eq=False)
 class Quantity:
     """A measured quantity of a cube: its ``truth`` in ``unit`` from ``facts`` of an ``experiment``, its uncertainty ``within`` and
-    its reason (``because``); ``of``: its value for a material. ``limit``: the reason why the shipped law cannot reach it.
-    ``is_order``: True for an order, which is met (1) or not (0), to a half.
+    the reason for it (``because``); ``of``: its value for a material. ``limit``: the reason why the shipped law cannot reach the
+    truth. ``is_order``: True for an order, which is met (1) or not (0), to a half.
     """
 
     name: str
@@ -48,8 +48,8 @@ def with_collagen(fibres: float, k1: float, k2: float) -> Material:
 
 @lru_cache(1000)
 def cube(material: Material, stretch: float, degrees: float, *, confined: bool = False) -> CubeState:
-    """A cube loaded along x to a ``stretch``, its fibres at ``degrees`` to that in the plane of x and y; where ``confined``, z
-    cannot move.
+    """A cube loaded along x to a ``stretch``, with fibres at ``degrees`` to x in the plane of x and y; if ``confined``, the cube
+    cannot deform along z.
     """
     fibre = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0])
     return loaded(material, (stretch, FREE, 1.0 if confined else FREE), fibre)
@@ -66,12 +66,12 @@ def poisson(stretch: float, degrees: float, axis: int) -> Callable[[Material], f
 
 
 def stiffness_ratio(stretch: float) -> Callable[[Material], float]:
-    """The stress of a cube loaded along its fibres over that of one loaded across them."""
+    """The stress of a cube loaded along its fibres over the stress of a cube loaded across them."""
     return lambda material: stress(material, stretch, 0) / stress(material, stretch, 90)
 
 
 def _extreme(material: Material, *, degrees: float, softest: bool) -> float:
-    """1 where, of cubes with fibres at 0, 45 and 90 degrees, that at ``degrees`` is softest (or stiffest) by 1 %, else 0."""
+    """1 if, among cubes with fibres at 0, 45 and 90 degrees, the cube at ``degrees`` is softest (or stiffest) by 1 %, else 0."""
     found = {angle: abs(stress(material, SQUEEZED, angle)) for angle in (0.0, 45.0, 90.0)}
     own = found.pop(degrees)
     clear = own < (1 - _CLEAR) * min(found.values()) if softest else own > (1 + _CLEAR) * max(found.values())
@@ -79,12 +79,12 @@ def _extreme(material: Material, *, degrees: float, softest: bool) -> float:
 
 
 def confinement(material: Material) -> float:
-    """The stress of semi-confined compression across fibres that lengthen over that of unconfined compression across them."""
+    """The stress of semi-confined compression across fibres that lengthen over the stress of unconfined compression across them."""
     return stress(material, SQUEEZED, 90, confined=True) / stress(material, SQUEEZED, 90)
 
 
 def both_orders(material: Material) -> float:
-    """1 where the cube is stiffer along its fibres in compression and stiffer across them in tension, by 1 % and more, else 0."""
+    """1 if the cube is stiffer along its fibres in compression and stiffer across them in tension, by 1 % and more, else 0."""
     squeezed, stretched = (stiffness_ratio(stretch)(material) for stretch in (SQUEEZED, STRETCHED))
     return float(squeezed > 1 + _CLEAR and stretched < 1 - _CLEAR)
 
@@ -114,7 +114,7 @@ def _pulled(name: str, title: str, condition: str, axis: int) -> Quantity:
 
 
 def _ratio_by_symmetry() -> Quantity:
-    """E along over E across: Poisson's ratios across and along are in that proportion, as the compliance is symmetric."""
+    """E along over E across: Poisson's ratios across and along have the same ratio, as the compliance is symmetric."""
     along, across = (find(LOOCKE, "poisson_ratio", words) for words in ("both strains across", "strain along them"))
     truth = along.value / across.value
     within = truth * math.hypot(0.05 / along.value, 0.05 / across.value)

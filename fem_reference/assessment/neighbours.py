@@ -1,4 +1,4 @@
-"""Penetration of muscles into each other: of the solved tetrahedra as a check, of any runs' surfaces as a measure."""
+"""Penetration of muscles into each other: a check for the solved tetrahedra, and a measure for the surfaces of any run."""
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations
@@ -19,8 +19,8 @@ _BULGE = 0.05
 
 
 def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
-    """The check that no muscle is inside another, by the corners of the tetrahedra, where contact acts or was left out as unneeded.
-    It allows the compliance of contact under its pressure and the bulge of facets. It is not met where no tetrahedra are stored.
+    """The check that no muscle is inside another, by the corners of the tetrahedra, if contact acts or was left out as unneeded.
+    The compliance of contact under its pressure and the bulge of facets are allowed. The check fails if no tetrahedra are stored.
     """
     if not problem.apart:
         return ()
@@ -47,7 +47,7 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
 
 
 def depths(runs: Mapping[str, Run]) -> Iterator[tuple[str, str, Floats]]:
-    """The names of each pair of muscles and the depth (f,) [mm] of their overlap at the frames of their ``runs``, NaN where one has
+    """The names of each pair of muscles and the depth (f,) [mm] of their overlap at the frames of their ``runs``, NaN if a run has
     no surface.
     """
     for one, other in combinations(runs, 2):

@@ -10,7 +10,7 @@ from fem_reference.metrics import described, metric
 FORMAT = 1
 # Measures of a run with an omission, relative to the complete run of the same solver.
 MEASURES = tuple(".".join(key) for key in described("main") if metric(key[0]).OF != "field")
-# Where all changes are below this share of the error bar, an omission does not matter.
+# If all changes are below this share of the error bar, an omission does not matter.
 NEGLIGIBLE = 0.1
 # Parts of the solving time that runs may report, and their names in runs; the total is a little more.
 PHASES = {"assembly": ("assembly",), "contact": ("contact",), "linear systems": ("factorisation", "krylov")}
@@ -21,12 +21,12 @@ Word = Literal["matters", "hardly", "does not matter", "not known"]
 
 @dataclass(frozen=True)
 class Omission:
-    """A run and its outcome; ``left_out``: names of the effects or features left out: none, one, or all that can be; ``instead``:
-    settings that had to change with them. A run that was not made has the status ``"refused"``.
+    """A run and its outcome. ``left_out``: names of the omitted effects or features (none, one, or all that can be omitted).
+    ``instead``: settings that had to change with them. A run that was not made has the status ``"refused"``.
 
-    ``changes``: by ``metric.statistic``, the greatest magnitude over the frames of the change from the complete run; left out
-    where unknown in a frame. ``predicted``: by the same, the value of an indicator, where there is one. ``costs``: by name, as in
-    the run.
+    ``changes``: by ``metric.statistic``, the greatest magnitude over the frames of the change from the complete run; left out if
+    unknown in a frame. ``predicted``: the value of an indicator, if any, by ``metric.statistic``. ``costs``: by name, as in the
+    run.
     """
 
     left_out: tuple[str, ...]
@@ -39,18 +39,20 @@ class Omission:
 
     @property
     def seconds(self) -> float:
-        """Processor time [s], for the reference that of solving without compilation; NaN where unknown."""
+        """Processor time [s], for the reference without compilation; NaN if unknown."""
         return self.costs.get("seconds_processor_solve", self.costs.get("seconds_processor", math.nan))
 
     def phase(self, name: str) -> float:
-        """Processor time [s] of one of ``PHASES``: its share of the time of solving; NaN where unknown."""
+        """Processor time [s] of one of ``PHASES``: its share of the time of solving; NaN if unknown."""
         spent = sum(self.costs.get(f"seconds_{part}", math.nan) for part in PHASES[name])
         return self.seconds * spent / (self.costs.get("seconds_solve") or math.nan)
 
 
 @dataclass(frozen=True)
 class Ablation:
-    """A run ``name`` by ``solver``: the ``whole`` one, and one with each of the ``omissions``; ``kept``: names never left out."""
+    """A run ``name`` by ``solver``: the complete run (``whole``), and a run with each of the ``omissions``; ``kept``: names never
+    left out.
+    """
 
     name: str
     solver: str
@@ -59,18 +61,18 @@ class Ablation:
     omissions: tuple[Omission, ...]
 
     def relative(self, seconds: float) -> float:
-        """A time [s] over that of the complete run, NaN where one is unknown."""
+        """A time [s] over that of the complete run, NaN if one is unknown."""
         return seconds / (self.whole.seconds or math.nan)
 
     def count(self, omission: Omission, name: str) -> float:
-        """One of ``COUNTS`` over that of the complete run, NaN where one is unknown."""
+        """One of ``COUNTS`` over that of the complete run, NaN if one is unknown."""
         return omission.costs.get(name, math.nan) / (self.whole.costs.get(name) or math.nan)
 
 
 @dataclass(frozen=True)
 class CaseOmissions:
-    """The ablations of a case, the reference's first. ``bars``: its error bars by ``metric.statistic``, the greatest over the
-    frames; ``unknown``: the reason why there are none; ``units`` by the same; ``origin``: provenance of the measurements.
+    """The ablations of a case, the reference's first. ``bars``, ``units``: its error bars, the greatest over the frames, and their
+    units by ``metric.statistic``; ``unknown``: the reason why there are no bars; ``origin``: provenance of the measurements.
     """
 
     case: str
@@ -83,7 +85,7 @@ class CaseOmissions:
 
 
 def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str, float]:
-    """Each of ``changes`` in error bars: NaN where the bar is unknown.
+    """Each of ``changes`` in error bars: NaN if the bar is unknown.
 
     >>> in_bars({"volume.deviation": 0.5, "surface_deviation.rms": 1.0}, {"volume.deviation": 0.25})
     {'volume.deviation': 2.0, 'surface_deviation.rms': nan}
@@ -93,7 +95,7 @@ def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str
 
 
 def verdict(changes: Mapping[str, float], bars: Mapping[str, float]) -> Word:
-    """Judge an omission: it matters where one of ``changes`` exceeds its error bar, and not where all are below a tenth of it.
+    """Judge an omission: it matters if one of ``changes`` exceeds its error bar, and does not if all are below a tenth of it.
 
     >>> bars = {"volume.deviation": 0.1, "surface_deviation.rms": 1.0}
     >>> [verdict({"volume.deviation": 0.005, "surface_deviation.rms": x}, bars) for x in (0.05, 0.5, 5.0)]

@@ -10,7 +10,7 @@ from fem_reference.metrics import Measure, described, find
 
 @dataclass(frozen=True)
 class Deviation:
-    """The distance of ``name`` from the reference in its worst frame, with the error ``bar`` there, NaN where unknown."""
+    """The distance of ``name`` from the reference in its worst frame, with the error ``bar`` in this frame, NaN if unknown."""
 
     name: str
     value: float
@@ -19,7 +19,7 @@ class Deviation:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A deviation with its possible ranks, ``first`` to ``last``, and the names ``alike`` that cannot be told apart from it."""
+    """A deviation with its possible ranks, ``first`` to ``last``, and the names ``alike`` that cannot be distinguished from it."""
 
     deviation: Deviation
     first: int
@@ -49,7 +49,7 @@ class Ranking:
 
 
 def ranked(deviations: Iterable[Deviation]) -> tuple[Ranked, ...]:
-    """The places of ``deviations``: one is less than another where their bars do not overlap; NaN comes last.
+    """The places of ``deviations``: one is less than another if their bars do not overlap; NaN comes last.
 
     >>> [place.rank for place in ranked([Deviation("a", 5.0, 0.4), Deviation("b", 2.0, 0.4), Deviation("c", 2.5, 0.4)])]
     ['1 to 2', '1 to 2', '3']
@@ -66,15 +66,15 @@ def ranked(deviations: Iterable[Deviation]) -> tuple[Ranked, ...]:
 
 
 def _less(one: Deviation, other: Deviation) -> bool:
-    """True where ``one`` is certainly nearer to the truth than ``other``."""
+    """True if ``one`` is certainly nearer to the truth than ``other``."""
     if math.isnan(other.value):
         return not math.isnan(one.value)
     return one.value + one.bar < other.value - other.bar
 
 
 def rankings(measured: dict[str, tuple[Measure, ...]], bars: Iterable[Measure]) -> tuple[Ranking, ...]:
-    """The rankings of ``measured`` (measures against the reference by name) by each ranked statistic, among those that have it;
-    ``bars``: the error bars of deviations; a statistic without one is left out.
+    """The rankings of ``measured`` (measures against the reference by name) by each ranked statistic, among runs that have it;
+    ``bars``: the error bars of deviations; a statistic without a bar is left out.
     """
     known, found = tuple(bars), []
     for key, stated in described("rank").items():

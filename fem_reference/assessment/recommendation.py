@@ -1,5 +1,5 @@
-"""Recommendation of the cheapest or most accurate setting, as measured on the case itself or on the most similar cases; and
-the transfer of settings, whose tetrahedra differ in size, to a case that is left out.
+"""Recommendation of the cheapest or most accurate setting, as measured on the case itself or on the most similar cases; and the
+transfer of settings, with other sizes of tetrahedra, to a case that is left out.
 """
 
 import math
@@ -17,7 +17,7 @@ TIME = "seconds_per_frame"
 Features = Mapping[str, float]  # the features of a case, by name
 # The number of other cases, the most similar ones, that are used.
 _ALIKE = 3
-# Margins are such that this share of the expectations from other cases holds on each case that is left out.
+# Margins are chosen so that this share of the expectations from other cases holds on each case that is left out.
 _MET = 0.95
 # The features that determine similarity.
 _COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
@@ -25,8 +25,8 @@ _COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
 
 @dataclass(frozen=True)
 class Expected:
-    """A setting with its expected ``error`` and ``time`` per frame [s]; ``of``: the cases on which it was measured. Where that is
-    the case itself, ``bar`` is the known error bar of the truth, as a part of the error.
+    """A setting with its expected ``error`` and ``time`` per frame [s]; ``of``: the cases on which it was measured. If it was
+    measured on the case itself, ``bar`` is the known error bar of the truth, which is part of the error.
     """
 
     point: Point
@@ -48,7 +48,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Margins:
-    """Factors on errors and times relative to the most similar cases; 1 where measured on the case."""
+    """Factors on errors and times relative to the most similar cases; 1 if measured on the case."""
 
     error: float = 1.0
     time: float = 1.0
@@ -56,9 +56,9 @@ class Margins:
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """The ``best`` setting (None: no setting meets the limits) out of ``count``, including ``margins``; ``measured``: True where
-    measured on the case itself; ``nearest``: the setting that misses the limits least, where none meets them; ``loads``: of all
-    settings, the share of the machine that other processes kept busy while they were timed.
+    """The ``best`` setting (None: no setting meets the limits) out of ``count``, including ``margins``; ``measured``: True if
+    measured on the case itself; ``nearest``: the setting that misses the limits least, if no setting meets them; ``loads``: for
+    each setting, the share of the machine that other processes kept busy while it was timed.
     """
 
     best: Expected | None
@@ -72,7 +72,7 @@ class Recommendation:
 
 @dataclass(frozen=True, eq=False)
 class KnownSettings:
-    """All ``settings`` for a case, with ``margins``, from the cases ``of``; ``measured``: True where that is the case itself."""
+    """All ``settings`` for a case, with ``margins``, from the cases ``of``; ``measured``: True if this is the case itself."""
 
     settings: tuple[Expected, ...]
     margins: Margins
@@ -83,7 +83,7 @@ class KnownSettings:
 def recommend(
     features: Features, case: str, studies: Sequence[CaseStudy], metric: str, limits: Mapping[str, float]
 ) -> Recommendation:
-    """The setting for a ``case`` that is :func:`chosen` by ``limits`` of all that :func:`known_settings` has."""
+    """The setting for a ``case``, :func:`chosen` by ``limits`` from all in :func:`known_settings`."""
     known = known_settings(features, case, studies, metric)
     best, nearest = chosen(known.settings, limits)
     loads = tuple(one.point.load for one in known.settings)
@@ -92,7 +92,7 @@ def recommend(
 
 def chosen(known: Sequence[Expected], limits: Mapping[str, float]) -> tuple[Expected | None, Expected | None]:
     """The cheapest setting whose error is at most ``limits["error"]``, or the most accurate whose time per frame [s] is at most
-    ``limits["time"]``, with both limits the cheapest within both; without one, the setting that misses the limits least.
+    ``limits["time"]``, with both limits the cheapest within both. If there is none, the setting that misses the limits least.
     """
     most = {"error": math.inf, "time": math.inf} | dict(limits)
     fitting = [one for one in known if one.error <= most["error"] and one.time <= most["time"]]
@@ -115,7 +115,7 @@ def known_settings(features: Features, case: str, studies: Sequence[CaseStudy], 
 
 
 def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> Sequence[CaseStudy]:
-    """The studies that are comparable with these features: lengths scale with the motion of bones, which there must be."""
+    """The studies that are comparable with these features: lengths scale with the motion of bones, so bones must move."""
     if _is_share(metric):
         return studies
     if not features["motion"] > 0:
@@ -127,13 +127,13 @@ def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], met
 
 
 def _is_same(one: Features, other: Features) -> bool:
-    """True where a case has the same features as when it was studied."""
+    """True if the features of a case have not changed since it was studied."""
     return all(math.isclose(value, other.get(name, math.nan), rel_tol=1e-6) for name, value in one.items())
 
 
 def alike(features: Features, studies: Iterable[CaseStudy]) -> list[CaseStudy]:
-    """The studies of the cases most like one with these features, the most alike first: by ratios, in powers of two; cases with
-    and without contact are far apart.
+    """The studies of the cases most similar to a case with these features, the most similar first: by ratios, in powers of two;
+    cases with and without contact are far apart.
     """
 
     def distance(study: CaseStudy) -> float:
@@ -176,7 +176,7 @@ def _expected(features: Features, studies: Sequence[CaseStudy], metric: str, mar
 
 
 def scale(features: Features, other: Features, metric: str) -> float:
-    """The factor from an error on the ``other`` case to one here: lengths scale with the motion, shares do not."""
+    """The factor from an error on the ``other`` case to an error on this case: lengths scale with the motion, shares do not."""
     return 1.0 if _is_share(metric) else features["motion"] / other["motion"]
 
 
@@ -185,7 +185,9 @@ def _is_share(metric: str) -> bool:
 
 
 def _translated(point: Point, study: CaseStudy, features: Features) -> Point:
-    """A point of a study for another case: tetrahedra relative to its own, doubled in size for each refinement below zero."""
+    """A point of a study for another case: tetrahedra relative to those of the case, doubled in size for each refinement below
+    zero.
+    """
     scene = dict(point.choice.get("scene", {}))
     if not set(TETRAHEDRA) <= set(scene):
         return point
@@ -197,7 +199,7 @@ def _translated(point: Point, study: CaseStudy, features: Features) -> Point:
 
 
 def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
-    """Margins from leaving out each study in turn: the ratio of its measured values to those expected from the others."""
+    """Margins from leaving out each study in turn: the ratio of its measured values to the values expected from the others."""
     errors, times = list[float](), list[float]()
     for study in studies:
         others = [other for other in studies if other is not study]
@@ -225,7 +227,7 @@ def setting(point: Point, study: CaseStudy) -> str:
 
 
 def is_elsewhere(point: Point) -> bool:
-    """True where a setting can be used on another case: only mesh keys of a scene are transferable."""
+    """True if a setting can be used on another case: only mesh keys of a scene are transferable."""
     return not set(point.choice.get("scene", {})) - {*TETRAHEDRA, "triangles"}
 
 
@@ -243,8 +245,8 @@ def _settings(point: Point) -> str:
 
 @dataclass(frozen=True)
 class Transfer:
-    """Settings of a ``solver`` chosen on all cases but one (``left_out``) and applied to that: their ``error`` there, the
-    ``best`` error of any of the same settings there, and that of the ``default`` (NaN where there is none).
+    """Settings of a ``solver`` chosen on all cases except ``left_out`` and applied to that case: their ``error``, the ``best``
+    error of any of the same settings, and the error of the ``default`` (NaN without a default), all on ``left_out``.
     """
 
     solver: str
@@ -256,7 +258,7 @@ class Transfer:
 
     @property
     def loss(self) -> float:
-        """The error over the least possible, minus one: 0 where the chosen settings are the best there too."""
+        """The error over the least possible error, minus one: 0 if the chosen settings are the best on that case too."""
         return self.error / self.best - 1
 
 

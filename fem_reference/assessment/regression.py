@@ -21,10 +21,10 @@ WORST_FIRST: tuple[Word, ...] = ("fail", "inconclusive", "pass")
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict on one ``question`` about the statistic ``name``, all numbers in ``unit`` and of the decisive frame.
+    """The verdict on one ``question`` about the statistic ``name``, all numbers in ``unit`` and from the decisive frame.
 
-    ``was`` and ``current`` are its values, NaN where there is none; ``allowed`` is its greatest distance from its earlier value
-    (``unchanged``) or from the reference (``within``), NaN where unknown; ``known`` is the error bar of that comparison value.
+    ``was`` and ``current`` are its values, NaN if there is none; ``allowed`` is its greatest distance from its earlier value
+    (``unchanged``) or from the reference (``within``), NaN if unknown; ``known`` is the error bar of that comparison value.
     """
 
     question: Question
@@ -44,7 +44,7 @@ class Judgement:
 
     @property
     def used(self) -> float:
-        """The distance as a share of the allowed one; infinite where that share is not a number."""
+        """The distance as a share of the allowed distance; infinite if this share is not a number."""
         part = self.away / self.allowed if self.allowed else math.inf
         return 0.0 if self.away == 0 else math.inf if math.isnan(part) else part
 
@@ -94,7 +94,7 @@ class Check:
 
     @property
     def word(self) -> Word:
-        """The verdict of all: a pass is doubtful where the reference is doubted."""
+        """The combined verdict: a pass is doubtful if there are doubts about the reference."""
         return judge.doubted(judge.overall(one.word for one in self.judgements), self.doubts)
 
     def answer(self, question: Question) -> Word:
@@ -153,7 +153,9 @@ def _of_statistic(name: str, stored: StoredStatistic, current: CurrentMeasures) 
 def _judged(
     question: Question, what: tuple[str, str], frames: _Frames, allowed: float, current: CurrentMeasures
 ) -> Judgement:
-    """The judgement by the decisive frame: of those with the decisive word, the farthest from its target or of the widest bar."""
+    """The judgement by the decisive frame: among frames with the decisive word, the farthest from its target or with the widest
+    bar.
+    """
     words = [_word(*map(float, row), allowed=allowed) for row in zip(*frames, strict=True)]
     word = judge.overall(words)
     deciding = frames.bars if word == "inconclusive" else np.abs(frames.current - frames.truth)
@@ -164,7 +166,7 @@ def _judged(
 
 
 def _word(was: float, value: float, truth: float, bar: float, *, allowed: float) -> Word:
-    """The verdict on one frame; inconclusive where there is no number before or now, fail where a number is new."""
+    """The verdict on one frame; inconclusive if there is no number before or now, fail if a number is new."""
     if math.isnan(was) and math.isnan(value):
         return "inconclusive"
     if math.isnan(truth):

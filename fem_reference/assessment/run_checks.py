@@ -24,11 +24,11 @@ from fem_reference.problems.setup import AttachedVertices, Bone
 from fem_reference.runs.contents import scalar_vectors, vector_names
 from fem_reference.runs.store import Run
 
-# A position is correct up to this share of the body's size; the rounding of stored values is a thousandth of that.
+# A position is correct up to this share of the body's size; the rounding of stored values is a thousandth of this share.
 ROUNDING = 1e-9
-# Exactly attached vertices may be off their bone by this strain (a stretch of 4) times their distance from the attached facets.
+# Exactly attached vertices may be off their bone by this strain (a stretch of 4) times their distance from attached facets.
 _STRAIN = 3.0
-# Safety factor on the mean extension of springs that follows from the recorded force, as they pull at other points of the surface.
+# Safety factor on the mean extension of springs from the recorded force, as springs pull at other points of the surface.
 _SPRINGS = 1.5
 # The greatest rotation of a bone per load step, on average between two frames: beyond it the sense of rotation is unknown.
 _TURN = 1.01 * math.pi / 2
@@ -55,7 +55,7 @@ class RunCheck:
 
     @property
     def met(self) -> bool:
-        """True where the value is allowed; never for a value that is not a number."""
+        """True if the value is allowed; never for a value that is not a number."""
         return self.value <= self.allowed
 
     @property
@@ -75,7 +75,7 @@ Nodes = Callable[[int], Floats | None]
 
 
 def of_body(body: Body, solved: Run) -> RunChecks:
-    """Check that states exist and are finite, are where prescribed exactly, and that parts that may touch do not cross."""
+    """Check that states exist and are finite, agree with exact prescriptions, and that parts that may touch do not cross."""
     numbers, points = tuple(state.number for state in solved.states), [state.points for state in solved.states]
     found = (_complete(body.frames, numbers), _finite(numbers, points))
     if not all(one.met for one in found):
@@ -92,13 +92,15 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
                 rest, along = body.mesh.points[nodes], list(entry.components)
                 wanted = entry.displacements(rest, state.number)
                 off = np.abs((state.points[nodes] - rest - wanted)[:, along]).max(axis=1)
-                # Where two regions meet, what they prescribe may differ by this much.
+                # The prescriptions of two regions may differ by this amount where the regions meet.
                 allowed = SAME * (body.size + float(np.abs(wanted).max()))
                 yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.number, rest)
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch. Allowed: smoothing, pressure over stiffness, overlap between points and what rest leaves."""
+    """Overlap of parts that may touch. Allowed: smoothing, pressure over stiffness, overlap between points, and the rest of the
+    overlap at rest.
+    """
     for law in body.touching:
         apart, depth = longest_edge(body.mesh, law) / 4, partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
@@ -112,7 +114,7 @@ def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:
     """Check that all frames exist, in order and finite; attachments are at their bones; load steps are small enough; forces
-    balance; and neither a bone nor the surface is crossed. ``nodes``: the points of the tetrahedra, where known.
+    balance; and neither a bone nor the surface is crossed. ``nodes``: the points of the tetrahedra, if known.
     """
     fibres = [] if run.fibre_positions is None else [run.fibre_positions]
     arrays = [np.concatenate([array[i] for array in (run.positions, *fibres)]) for i in range(len(run.numbers))]
@@ -128,7 +130,7 @@ def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -
 
 
 def worst(checks: Iterable[RunCheck]) -> RunChecks:
-    """For each name, the check that comes nearest to its allowed value, or exceeds it most."""
+    """For each name, the check that is nearest to its allowed value, or exceeds it most."""
     found = dict[str, RunCheck]()
     for one in checks:
         if one.name not in found or one.share > found[one.name].share:
@@ -142,7 +144,7 @@ def _areas(surface: Surface) -> Floats:
 
 
 def _at(name: str, values: Floats, allowed: Floats, frame: float, places: Floats) -> RunCheck:
-    """The check at the point (n, 3) whose ``values`` (n,) [mm] come nearest to ``allowed`` (n,), or exceed it most."""
+    """The check at the point (n, 3) whose ``values`` (n,) [mm] are nearest to ``allowed`` (n,), or exceed it most."""
     i = int(np.argmax(values / allowed))
     return RunCheck(name, float(values[i]), float(allowed[i]), "mm", frame, place_of(places[i]))
 
@@ -162,8 +164,8 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
 
 
 def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
-    """Exact attachments: distance of vertices from where their bone carries them, up to a strain times their distance from the
-    attached facets. Springs: their mean extension, which is force over stiffness and area; in situ they have a force at rest.
+    """Exact attachments: distance of vertices from their positions moved with the bone, up to a strain times their distance from
+    the attached facets. Springs: their mean extension, which is force over stiffness and area; in situ they have a force at rest.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets_away = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
@@ -200,7 +202,7 @@ def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
 
 
 def _travel(bone: Bone, before: float, after: float) -> float:
-    """Travel of a bone between two frames [rad or mm]; on a way there and back both directions count."""
+    """Travel of a bone between two frames [rad or mm]; in a motion out and back both directions count."""
     motion = bone.motion
     assert motion is not None  # called for moving bones only
     stops = [before, *(frame for frame in motion.frames if before < frame < after), after]
@@ -209,7 +211,7 @@ def _travel(bone: Bone, before: float, after: float) -> float:
 
 def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     """The sums of forces and of moments that bones exert on the muscle, by attachments and contact: 0 without external loads, else
-    in balance with these. An effect of a user's own may be such a load, so with one there is no check.
+    in balance with these. A user's own effect may be such a load, so there is no check with such effects.
     """
     residual = BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
     allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
@@ -241,15 +243,17 @@ def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
     for i, number in enumerate(run.numbers):
         poses, points = np.array([bone.pose(number) for bone in bones]), run.positions[i]
         posed = (one for earlier, one in seen if np.abs(poses - earlier).max(initial=0.0) <= near)
-        alike = (one for one in posed if np.abs(points[:9] - one[:9]).max() <= near)  # few need a full comparison
+        alike = (
+            one for one in posed if np.abs(points[:9] - one[:9]).max() <= near
+        )  # few frames need a full comparison
         if not any(np.abs(points - one).max() <= near for one in alike):
             seen.append((poses, points))
             yield i, number
 
 
 def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
-    """Penetration of the muscle and each bone in contact. Where the muscle's surface, whose triangles may be large, is deeper than
-    allowed, the boundary of its tetrahedra is checked too: the check fails where both are.
+    """Penetration of the muscle and each bone in contact. If the muscle's surface, whose triangles may be large, is deeper than
+    allowed, the boundary of its tetrahedra is checked too: the check fails if both are too deep.
     """
     rest, apart = run.surface, spacing(problem.surface)
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
@@ -266,7 +270,9 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 
 
 def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
-    """Penetration of a bone and the muscle; above the ``give`` only its part beyond rest. A bone's middle is never allowed."""
+    """Penetration of a bone and the muscle; above the ``give`` only the part in excess of rest counts. Penetration to the middle of
+    a bone is never allowed.
+    """
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:
@@ -289,7 +295,7 @@ def give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> f
 
 
 def _creases(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """Self-penetration of the muscle's surface beyond that at rest; with self-contact, up to the penetration that this allows."""
+    """Self-penetration of the muscle's surface in excess of rest; with self-contact, the penetration that it allows is accepted."""
     surface, law, none = run.surface, touching.among(problem.effects), np.zeros(len(run.numbers))
     pressure = np.nan_to_num(run.scalars.get("touching_pressure", none)) / (law.stiffness if law else np.inf)
     most = _OWN * (apart := spacing(surface))

@@ -17,8 +17,8 @@ FILE = Path(__file__).with_suffix(".toml")
 
 
 class SolverKind(Record):
-    """A row of the report's table: its ``name``, the ``form`` of its model, the report's ``speed`` and ``precision`` in pluses and
-    minuses, the numbers of its ``literature`` there, and names of candidates of cases that stand for it, ``of_case``.
+    """A row of the report's table: its ``name``, the ``form`` of its model, the report's ``speed`` and ``precision`` in plus and
+    minus signs, the numbers of its ``literature`` in the report, and ``of_case``, names of candidates of cases that represent it.
     """
 
     name: str
@@ -58,10 +58,9 @@ def _file() -> _File:
 
 @dataclass(frozen=True, eq=False)
 class SolverResult:
-    """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] where known, and ``measures``
-    against the reference; for the reference itself they are its error bars, none where these were not requested. ``needs``: the
-    parameters that a user must give, by kind; empty where that is not known. ``unsound``: the reason why its frames are no
-    answer, empty where they are one.
+    """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] if known, and ``measures`` against
+    the reference; for the reference itself its error bars, empty if these were not requested. ``needs``: the parameters that a user
+    must give, by kind; empty if that is not known. ``unsound``: the reason why its frames are no answer, else empty.
     """
 
     kind: str
@@ -78,7 +77,7 @@ class SolverResult:
     unsound: str = ""
 
     def worst(self, metric: str, statistic: str) -> tuple[float, int] | None:
-        """The value of greatest magnitude over the frames and its frame; NaN where any frame is NaN, None without the measure."""
+        """The value of greatest magnitude over the frames and its frame; NaN if any frame is NaN, None without the measure."""
         found = find(self.measures, metric, statistic)
         return None if found is None else (found.worst.value, self.numbers[found.worst.index])
 
@@ -97,7 +96,7 @@ class Scenario:
 @dataclass(frozen=True)
 class Overall:
     """A solver's worst frames over scenarios: the ``median`` of their magnitudes over the ``count`` scenarios in which every frame
-    has a number, the ``worst`` of these magnitudes and its ``case``, and the cases on which the solver was ``lost``.
+    has a number, the ``worst`` of these magnitudes and its ``case``, and the ``lost`` cases, on which the solver failed.
     """
 
     median: float
@@ -131,12 +130,12 @@ class Table:
         return list(dict.fromkeys(one.name for one in self.results if one.kind == kind))
 
     def needs(self, kind: str, name: str) -> Mapping[str, int]:
-        """The parameters that ``name`` needs on the scene with most of them; empty where that is not known."""
+        """The parameters that ``name`` needs on the scene with most of them; empty if that is not known."""
         found = [one.needs for one in self._by(kind, name)]
         return max(found, key=lambda needs: sum(needs.values()), default={})
 
     def over(self, kind: str, name: str, metric: str, statistic: str) -> "Overall | None":
-        """The worst frames of ``name`` over all scenarios; None where it was not measured."""
+        """The worst frames of ``name`` over all scenarios; None if it was not measured."""
         mine = self._by(kind, name)
         found = [(value[0], one.case) for one in mine if (value := one.worst(metric, statistic)) is not None]
         finite = [(value, case) for value, case in found if not np.isnan(value)]

@@ -1,4 +1,4 @@
-"""Reasons why the frames of a candidate are no answer although every number is finite; such a candidate is not ranked."""
+"""Reasons why the frames of a candidate are no answer, although every number is finite; such a candidate is not ranked."""
 
 import numpy as np
 
@@ -6,20 +6,20 @@ from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume
 from fem_reference.geometry.distance import outer_windings
 from fem_reference.runs.store import Run
 
-# The enclosed volume over that of the reference: below the first the body has collapsed, above the second it has exploded. The
-# worst of the shipped solvers is at 0.8.
+# The enclosed volume over that of the reference: below the first value the body has collapsed, above the second it has exploded.
+# The worst of the shipped solvers has 0.8.
 _LEAST, _MOST = 0.5, 2.0
 # The greatest distance of a vertex from the reference, over the size of the body.
 _FARTHEST = 1.0
-# The share of the surface that may be inside out, beyond that of the reference.
+# The share of the surface that may be inside out, in excess of the share in the reference.
 _TURNED = 0.05
 # A vertex is stuck if it moves by less than the first share of the body's size, and in the reference by more than the second.
 _STILL, _MOVES = 1e-6, 1e-2
 
 
 def unsound(run: Run, reference: Run) -> str:
-    """The first reason why the frames of a ``run`` are no answer, with its frame; empty where they are an answer, and for a run
-    without the reference's surface. Only frames that both runs reached count.
+    """The first reason why the frames of a ``run`` are no answer, with its frame; else empty; also empty for a run without the
+    reference's surface. Only frames that both runs reached count.
     """
     if not run.has_surface or run.positions.shape != reference.positions.shape:
         return ""  # a run of lines, or of another surface
@@ -33,7 +33,7 @@ def unsound(run: Run, reference: Run) -> str:
 
 
 def _of_frame(run: Run, mine: Floats, truth: Floats) -> str:
-    """The reason at a frame, from positions (n, 3) [mm]; empty where there is none."""
+    """The reason at a frame, from positions (n, 3) [mm]; empty if there is none."""
     triangles, size = run.surface.triangles, diagonal(run.surface.points)
     away = float(np.linalg.norm(mine - truth, axis=1).max())
     if not away <= _FARTHEST * size:

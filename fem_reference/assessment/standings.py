@@ -13,7 +13,8 @@ from fem_reference.io import texts
 # The version of the method of measurement: rows of another version are stale.
 PROTOCOL = 3
 STATES = ("failed", "stale")
-# The statistic by which rows are compared [mm], and the same in per cent; the error [mm] and time [s] at which they are matched.
+# The statistic by which rows are compared [mm], and the same in per cent; the error [mm] and time [s] at which solvers are
+# compared.
 ERROR, SHARE = "surface_deviation.rms", "surface_deviation.rms_percent"
 MATCHED_ERROR, MATCHED_TIME = 2.0, 0.1
 
@@ -23,8 +24,8 @@ class Standing(Record):
     empty for the reference, which has ``bars``. ``from_rest``: rms distance [mm] of the last frame from the first, if the reference
     is back at rest there. ``unsound``: the reason why its frames are no answer. ``split``: root mean squares [mm] of the parts
     of its error. ``least_error``: the error [mm] if within the matched time; ``least_time``: the time [s] if within the matched
-    error. ``truth`` and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``; ``stale``: True where
-    case, reference, solver, protocol or time limit changed since; ``time_limit``: its greatest processor time [s].
+    error. ``truth`` and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``; ``stale``: True if case,
+    reference, solver, protocol or time limit changed since; ``time_limit``: its greatest processor time [s].
     """
 
     case: str
@@ -52,7 +53,7 @@ class Standing(Record):
 
     @property
     def failed(self) -> bool:
-        """True where the row is not to be ranked."""
+        """True if the row is not to be ranked."""
         return self.status != "converged" or bool(self.unsound)
 
     @property
@@ -62,20 +63,20 @@ class Standing(Record):
         return self.unsound or (f"not within {self.time_limit:g} s" if late else self.status)
 
     def is_of(self, truth: str, run: str) -> bool:
-        """True where the row was measured by this protocol, on runs with these keys."""
+        """True if the row was measured by this protocol, on runs with these keys."""
         return (self.truth, self.run, self.protocol) == (truth, run, PROTOCOL)
 
     def kept(self, missing: bool) -> "Standing":
-        """The row as it is kept if its case was not measured again; ``missing``: True if that was not possible."""
+        """The row as it is kept if its case was not measured again; ``missing``: True if this was not possible."""
         return self.model_copy(update={"stale": self.stale or missing or self.protocol != PROTOCOL})
 
     def asked(self, only: Collection[str]) -> bool:
-        """True where the row should be measured again: if it is in one of the states ``only``, or if these are empty."""
+        """True if the row should be measured again: if it is in one of the states ``only``, or if these are empty."""
         return not only or ("failed" in only and self.failed) or ("stale" in only and self.stale)
 
 
 class Standings(Record):
-    """The ``rows``; ``missing``: by case, or case and solver, why there is no row; ``changes``: those since the last standings."""
+    """The ``rows``; ``missing``: by case, or case and solver, why there is no row; ``changes`` since the last standings."""
 
     rows: tuple[Standing, ...]
     missing: dict[str, str]
@@ -88,7 +89,7 @@ class Standings(Record):
         return list(dict.fromkeys(row.case for row in self.rows))
 
     def of(self, case: str) -> list[Standing]:
-        """The rows of a case, by group and error; failed ones come last in their group, in no order."""
+        """The rows of a case, by group and error; failed rows come last in their group, in no order."""
         groups = list(dict.fromkeys(row.group for row in self.rows))
         return sorted(
             (row for row in self.rows if row.case == case),
@@ -134,7 +135,7 @@ def _error(row: Standing, name: str) -> float:
 
 
 def load(path: Path) -> tuple[Standing, ...]:
-    """The rows of standings that were written to ``path``; none where there is no file. InputError where it is another file."""
+    """The rows of standings that were written to ``path``; none if there is no file. InputError for any other file."""
     if not path.exists():
         return ()
     found = texts.read_json(path, "standings as the verb standings writes them")

@@ -12,7 +12,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
 from fem_reference.io.texts import plain
 
-# Not applicable: the solver does not accept the case. No solution: no equilibrium exists, and the solver reports that.
+# Not applicable: the solver does not accept the case. No solution: no equilibrium exists, and the solver reports this.
 Verdict = Literal["ok", "degraded", "failed", "not applicable", "no solution", "inconclusive"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
@@ -27,8 +27,8 @@ class Bound(Record):
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """A quantity over frames: ``values`` (f,) in ``unit`` at frame ``numbers``, ``where`` each is worst in words, and the
-    ``points`` (f, 3) [mm] there, for a quantity with a place.
+    """A quantity over frames: ``values`` (f,) in ``unit`` at frame ``numbers``, ``where``: the worst place of each in words;
+    ``points`` (f, 3) [mm]: the worst places, for a quantity with a place.
     """
 
     quantity: str
@@ -110,8 +110,8 @@ Weighed = Sequence[tuple[Bound, History]]
 
 
 def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
-    """``cell``, for a run that reached every frame, with the verdict by its bounds: by the first violated one, else the first of
-    all. A value that is not finite fails, whatever the status; so does a ``contrast`` without the violation that it should show.
+    """``cell``, for a run that reached every frame, with the verdict by its bounds: by the first violated bound, else the first of
+    all. A value that is not finite fails for any status; so does a ``contrast`` without the violation that it should show.
     """
     shown = _decisive(cell, weighed)
     if shown.value is None or shown.bound is None or not np.isfinite(shown.value):

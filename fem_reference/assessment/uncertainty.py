@@ -1,4 +1,4 @@
-"""The band of answers that unknown parameters of a case allow, with the sensitivities, as records; and a candidate beside it."""
+"""The band of results for unknown parameters of a case, with the sensitivities, as records; and a candidate compared with it."""
 
 import math
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ class Parameter:
 
     @property
     def contains(self) -> bool:
-        """True where the case's own value is within the range."""
+        """True if the case's own value is within the range."""
         return self.low <= self.nominal <= self.high
 
     def value(self, place: float) -> float:
@@ -57,7 +57,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Failure:
-    """A run of the design that has no answer: its parameters by key, and its end."""
+    """A run of the design without a result: its parameters by key, and the reason."""
 
     values: dict[str, float]
     status: str
@@ -67,13 +67,14 @@ class Failure:
 @dataclass(frozen=True, eq=False)
 class Band:
     """The band of a ``quantity`` over frame ``numbers`` (f,), in ``unit``: 5th percentile ``low``, ``median`` and 95th percentile
-    ``high`` (f,) beside the case's own answer ``nominal``; NaN where the quantity is not defined. ``bar`` (f,): the numerical error
-    bar of that answer, None where it has none. ``distance``: True for a distance from that answer; less is then always inside.
+    ``high`` (f,), and the result of the case, ``nominal``; NaN if the quantity is not defined. ``bar`` (f,): the numerical error
+    bar of this result, None if it has none. ``distance``: True for a distance from this result; smaller values are then always
+    inside.
 
-    ``error``: of the surrogate, as a share of the variance, at runs that it was not fitted to; NaN where there is none.
-    ``by``: the source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: the reason why there is no band, empty
-    where there is one. ``first`` and ``total``: the share of the variance over all frames by key of the parameter; empty where the
-    surrogate is not accurate enough (``unreliable``).
+    ``error``: of the surrogate, as a share of the variance, at runs excluded from its fit; NaN without a surrogate. ``by``: the
+    source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: the reason why there is no band, else empty.
+    ``first`` and ``total``: the share of the variance over all frames by key of the parameter; empty if the surrogate is not
+    accurate enough (``unreliable``).
     """
 
     quantity: str
@@ -101,15 +102,15 @@ class Band:
 
     @property
     def greatest_bar(self) -> float:
-        """The greatest error bar over the frames, NaN where there is none."""
+        """The greatest error bar over the frames, NaN without a bar."""
         known = self.bar is not None and np.isfinite(self.bar).any()
         return float(np.nanmax(self.bar)) if known else math.nan  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A candidate beside a band: its ``values`` (f,), and by frame its ``places``, empty where there is no band or no value is
-    expected.
+    """A candidate compared with a band: its ``values`` (f,), and by frame its ``places``, empty without a band or an expected
+    value.
     """
 
     candidate: str
@@ -120,13 +121,13 @@ class Placed:
 
     @property
     def word(self) -> str:
-        """The worst place over the frames; empty where there is none."""
+        """The worst place over the frames; empty if there is none."""
         found = set(self.places)
         return next((word for word in ("no answer", "outside", "undecided", "inside") if word in found), "")
 
     @property
     def share(self) -> float:
-        """The share of the frames in which it is inside; NaN where no frame counts."""
+        """The share of the frames in which it is inside; NaN if no frame counts."""
         counted = [one for one in self.places if one]
         return counted.count("inside") / len(counted) if counted else math.nan
 
@@ -162,8 +163,8 @@ class Uncertainty:
 
 
 def place(candidate: str, band: Band, values: Floats) -> Placed:
-    """A candidate's ``values`` (f,) beside a band: inside or outside by more than the error bar of the reference, else undecided,
-    as without a bar. A value that is not finite is no answer.
+    """A candidate's ``values`` (f,) compared with a band: inside or outside by more than the error bar of the reference, else
+    undecided; also undecided without a bar. A value that is not finite is no answer.
     """
     bar = np.full(len(values), math.nan) if band.bar is None else band.bar
     above, below = band.high - values, math.inf if band.distance else values - band.low

@@ -1,4 +1,4 @@
-"""Two versions of one solver: the statistics that came nearer to the reference or went farther away, and their frames."""
+"""Two versions of one solver: the statistics that moved nearer to the reference or farther away, and their frames."""
 
 import math
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ ORDER: tuple[Word, ...] = ("worse", "mixed", "better", "within the error bar", "
 @dataclass(frozen=True, eq=False)
 class Change:
     """The distances of a statistic from the reference, earlier (``was``) and ``now`` (f,), in ``unit``, at frame ``numbers``;
-    ``bars`` (f,): the error bars of the reference, NaN where unknown.
+    ``bars`` (f,): the error bars of the reference, NaN if unknown.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Change:
 
     @property
     def further(self) -> Floats:
-        """The increase of the distance (f,), negative where it is nearer; infinite where a number was lost or found."""
+        """The increase of the distance (f,), negative if it is nearer; infinite if a number was lost or found."""
         lost, found = np.isnan(self.now) & ~np.isnan(self.was), np.isnan(self.was) & ~np.isnan(self.now)
         further = np.abs(self.now) - np.abs(self.was)
         return np.where(lost, np.inf, np.where(found, -np.inf, further))
@@ -51,7 +51,7 @@ class Change:
 
     @property
     def by(self) -> float:
-        """The change in that frame, positive where the distance grew; NaN without a number before or now."""
+        """The change in that frame, positive if the distance grew; NaN without a number before or now."""
         return float(self.further[self.at])
 
     @property
@@ -66,7 +66,7 @@ class Change:
 
     @property
     def in_bars(self) -> float:
-        """The change in that frame in error bars, NaN where these are unknown."""
+        """The change in that frame in error bars, NaN if these are unknown."""
         return self.by / self.bar if self.bar > 0 else math.nan
 
     @property
@@ -105,8 +105,9 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Versions:
-    """``current`` against an earlier state, ``was`` in words: ``changes``, the worst first; the distance ``moved`` (f, k) [mm] of
-    each of the ``vertices`` (k,) since then; and the earlier positions (f, n, 3) [mm], None where only some vertices are known.
+    """``current`` compared with an earlier state (``was``, in words): ``changes``, the worst first; the distance ``moved`` (f, k)
+    [mm] of each of the ``vertices`` (k,) since then; and the earlier positions (f, n, 3) [mm], None if only some vertices are
+    known.
     """
 
     current: CurrentMeasures

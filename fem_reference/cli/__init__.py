@@ -88,7 +88,7 @@ def _why_broken(error: BaseException) -> str:
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
-    """InputError where an output cannot be written, before anything is measured; creates nothing."""
+    """InputError if an output cannot be written, before anything is measured; creates nothing."""
     _check_folder("--out", out(options), written=options.writes)
     if getattr(options, "to", None) is not None:
         _check_folder("--to", options.to.absolute().parent, written=True)
@@ -102,7 +102,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _check_name(name: str | None) -> None:
-    """InputError where ``--name`` cannot be the name of a page: the names of other files beside pages are reserved."""
+    """InputError if ``--name`` cannot be the name of a page: the names of other files beside pages are reserved."""
     from fem_reference.report.asked import LONGEST  # here, as packages that this module needs may be missing
 
     taken = ("runs", "docs", "index")

@@ -101,7 +101,7 @@ def command_parts(own: Iterable[Candidate]) -> list[Part]:
 
 
 def check_names(names: list[str]) -> None:
-    """InputError where two candidates have the same name, or one has the name of the reference."""
+    """InputError if two candidates have the same name, or one has the name of the reference."""
     for name in names:
         if name == "reference":
             raise InputError("--candidate", '"reference"', "another name: this is what candidates are measured against")
@@ -111,7 +111,7 @@ def check_names(names: list[str]) -> None:
 
 def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[C]:
     """The bench of a case; InputError for wrong expectations, solvers or names, and for error bars of a scalar case."""
-    if options.error_bar:
+    if options.error_bar and not scene.parts:
         casefile.muscle(scene, "--error-bar")
     check_names([entry.name for entry, _ in chosen])
     for one in scene.parts or (scene,):
@@ -185,7 +185,7 @@ def _page(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate,
 def _compared_muscles(bench: Bench[Any], options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Measure and judge each of several muscles, and write a page for each."""
     with fenicsx.shared():
-        found = by_muscle.compared(bench, chosen)
+        found = by_muscle.compared(bench, chosen, error_bars=options.error_bar)
     case, texts, pages = bench.scene, list[str](), list[str]()
     facts: dict[str, Any] = {"case": case.name, "muscles": {}}
     for name, result in found.muscles.items():

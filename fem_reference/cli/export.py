@@ -83,7 +83,7 @@ def _runs_of_several(case: Case, options: argparse.Namespace) -> int:
 
 
 def _with_states(bench: Bench[MuscleCase], *, again: bool) -> Run:
-    """The reference with its states; InputError where it was solved without them, unless it is to be solved ``again``."""
+    """The reference with its states; InputError if it was solved without them, unless it is to be solved ``again``."""
     choice = bench.scene.reference
     if not hasattr(bench.settings(choice, "reference"), "store_state"):
         return bench.reference()

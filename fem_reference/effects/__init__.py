@@ -1,13 +1,13 @@
 """Effects: one file each, named as in scene files. A problem sums its effects and adds nothing else.
 
-Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters, with one expression, written only
-once and with nothing but operators and the functions of ``Functions``, so that a solver can use it symbolically and a test can
-evaluate it in numpy. An ``Effect`` of a body is of one of three kinds: an ``Energy`` per rest volume, a ``Load`` on a part of its
-surface (a traction, where no energy exists), or a ``Prestrain``, which changes the deformation on which the energies depend. A
-``FieldEffect`` acts on a scalar field psi and has a weak form.
+Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters, with one expression, written once,
+with operators and the functions of ``Functions`` only. So a solver can use the expression symbolically, and a test can evaluate it
+in numpy. An ``Effect`` of a body is of one of three kinds: an ``Energy`` per rest volume, a ``Load`` on a part of its surface (a
+traction, where no energy exists), or a ``Prestrain``, which changes the deformation on which the energies depend. A ``FieldEffect``
+acts on a scalar field psi and has a weak form.
 
-A solver may replace the parameters of an effect by symbols, so that one compiled form serves all their values: an expression never
-branches on a parameter, and uses it with operators and ``state.functions`` only.
+A solver may replace the parameters of an effect by symbols, so that one compiled form serves all their values. So an expression
+never branches on a parameter, and applies only operators and ``state.functions`` to parameters.
 """
 
 import importlib
@@ -37,11 +37,10 @@ __path__ += outside.folders()
 class Effect(Record):
     """A frozen record of the parameters of an effect on a body.
 
-    ``unknowns``: names of the fields that it adds; ``needs``: what it requires: ``"fibre"``, fibre directions at rest;
-    ``"interval"``, the time between frame numbers; ``"momentum"``, velocities and predicted displacements in a load step;
-    ``outer``: True where it acts from outside the body, so that its forces do not balance by themselves; ``example``: some of its
-    parameters, as scene files write them, besides those of its kind; ``published``: by name, the ranges of its parameters in the
-    literature on muscle.
+    ``unknowns``: names of the fields that the effect adds. ``needs``: its requirements, of ``"fibre"`` (fibre directions at rest),
+    ``"interval"`` (the time between frame numbers) and ``"momentum"`` (velocities and predicted displacements in a load step).
+    ``outer``: True if the effect acts from outside the body, so that its forces do not balance. ``example``: some of its parameters
+    as in scene files, except those of its kind. ``published``: the ranges of its parameters in the literature on muscle, by name.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ()
@@ -55,28 +54,26 @@ class Effect(Record):
         return 1.0
 
     def limits(self) -> tuple[Limit, ...]:
-        """The ranges in which it is valid; empty unless its docstring states one."""
+        """The ranges in which the effect is valid; empty unless its docstring states a range."""
         return ()
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest."""
+        """The stiffness of the body at rest due to the effect."""
         return Moduli()
 
     def resultant(self, shape: Shape) -> Wrench | None:  # noqa: ARG002
-        """The force and moment of its full amount on a whole body of this ``shape``; None where they are unknown or depend on more
+        """The force and moment of the full amount on an entire body of this ``shape``; None if they are unknown or depend on more
         than the shape, such as velocities within a load step.
         """
         return None if self.outer else Wrench(np.zeros(3), np.zeros(3))
 
     def indicator(self, scene: Estimates) -> Indicator | None:  # noqa: ARG002
-        """The evidence that a scene needs it, known before a solution; None for a part of the material, which is always
-        needed.
-        """
+        """The evidence, before solving, that a scene needs the effect; None for a part of the material, which is always needed."""
         return None
 
     @property
     def title(self) -> str:
-        """Its name, with its part of the surface and its region, which distinguish it from others of its kind in a scene."""
+        """The name of the effect, with its part of the surface and its region, as a scene may have several effects of a kind."""
         on = getattr(self, "on", "")
         return (
             type(self).__name__ + (f" on {on}" if on else "") + (f" in {region}" if (region := region_of(self)) else "")
@@ -90,7 +87,7 @@ class Effect(Record):
 
 
 class Ramped(Effect):
-    """An effect with a ramp: ``ramp`` gives its amount, linear between its knots, constant beyond them."""
+    """An effect with a ramp: ``ramp`` gives the amount of the effect, linear between knots and constant beyond them."""
 
     example: ClassVar[dict[str, Any]] = {"ramp": [{"frame": 0, "amount": 0.0}, {"frame": 10, "amount": 1.0}]}
     ramp: tuple[RampPoint, ...] = Field(min_length=1)
@@ -107,8 +104,8 @@ class Ramped(Effect):
 
 
 class Energy(Effect):
-    """An effect with an energy per rest volume; ``stored``: True where the energy is recoverable. It acts everywhere, or in a
-    ``region`` of the body (``in``), in proportion to the share of a point in the region.
+    """An effect with an energy per rest volume; ``stored``: True if the energy is recoverable. The effect acts everywhere, or in a
+    ``region`` of the body (``in``) in proportion to the share of a point in the region.
     """
 
     stored: ClassVar[bool] = True
@@ -122,7 +119,7 @@ class Energy(Effect):
         return region
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa] at ``state``, of a point that is fully in its region."""
+        """Energy per rest volume [MPa] at ``state``, for a point that is fully in the region."""
         raise NotImplementedError(f"{type(self).__name__} has no energy")
 
     def weighted(self, state: State) -> Any:
@@ -136,13 +133,13 @@ def region_of(effect: Record) -> str:
 
 
 def regions_named(effects: Iterable[Record]) -> list[str]:
-    """The names of the regions in which ``effects`` act, or outside which they act, each once."""
+    """The names of the regions inside or outside of which ``effects`` act, each once."""
     named = filter(None, map(region_of, effects))
     return list(dict.fromkeys(region.removeprefix(REST) for region in named))
 
 
 class VolumeLaw(Energy):
-    """An energy that depends on the volume alone, with the bulk modulus ``bulk`` [MPa]. It is valid for V/V0 from 1/2 to 2."""
+    """An energy that depends on the volume alone, with the bulk modulus ``bulk`` [MPa]; valid for V/V0 from 1/2 to 2."""
 
     example: ClassVar[dict[str, Any]] = {"bulk": "10 MPa"}
     bulk: PositivePressure
@@ -171,14 +168,14 @@ class PassiveFibres(Energy):
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The tension of the fibres at the greatest expected stretch, compared with the matrix."""
+        """The tension of the fibres at the greatest expected stretch, compared with the stiffness of the matrix."""
         greatest = scene.stretch[1]
         pull = fibre_tension(self.energy, greatest)
         return fibre_indicator(scene, pull, scene.shorten(pull, 0.1 * (greatest - 1)))
 
 
 class Load(Effect):
-    """A load on the part ``on`` of the surface. If ``stored``, it has an energy per rest area, else a traction."""
+    """A load on the part ``on`` of the surface. If ``stored``, the load has an energy per rest area, otherwise a traction."""
 
     outer: ClassVar[bool] = True
     stored: ClassVar[bool] = False
@@ -195,7 +192,7 @@ class Load(Effect):
 
 
 class Interaction(Effect):
-    """An effect between a body and bones or muscles around it, which a problem makes from a scene."""
+    """An effect between a body and the bones or muscles around it, made by a problem from a scene."""
 
 
 class Prestrain(Effect):
@@ -216,8 +213,8 @@ def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
 
 
 def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
-    """The sum of the energies per rest volume [MPa] of ``acting``, (effect, amount) each, at ``state``, whose F is the whole
-    deformation gradient. A prestrain changes the F before the step as it changes the present F, so its own ramp causes no rate.
+    """The sum of the energies per rest volume [MPa] of ``acting``, (effect, amount) each, at ``state``, whose F is the total
+    deformation gradient. A prestrain changes the F before the step and the present F in the same way, so its ramp causes no rate.
     """
     state = elastic_state(acting, state)
     return sum(law.weighted(replace(state, amount=amount)) for law, amount in acting if isinstance(law, Energy))
@@ -250,19 +247,19 @@ def names(kind: type[Record] = Effect) -> list[str]:
 
 
 def find(name: str) -> type[Record]:
-    """The record of the effect ``name``; KeyError where there is none."""
+    """The record of the effect ``name``; KeyError if there is none."""
     if name not in modules.names(__path__):
         raise KeyError(name)
     return _record(name)
 
 
 def name_of(effect: Record | type[Record]) -> str:
-    """The name of an ``effect``, or of its kind, in scene files, which is that of its file."""
+    """The name of an ``effect`` or its kind in scene files, which is the name of its file."""
     return effect.__module__.rpartition(".")[2]
 
 
 def example(name: str) -> dict[str, Any]:
-    """An example of the parameters of the effect ``name``, with those of all of its kind."""
+    """An example of the parameters of the effect ``name``, including the parameters of its kind."""
     stated = [vars(kind).get("example", {}) for kind in reversed(find(name).__mro__)]
     return {key: value for one in stated for key, value in one.items()}
 
@@ -279,7 +276,7 @@ def _record(name: str) -> type[Record]:
 
 
 def make(name: str, **parameters: Any) -> "Effect":
-    """The effect ``name``, its parameters as in scene files or numbers in mm, N, MPa, s, tonne; InputError where one is wrong.
+    """The effect ``name``, its parameters as in scene files or numbers in mm, N, MPa, s, tonne; InputError if one is wrong.
 
     >>> make("neo_hooke", mu="10 kPa").mu, make("neo_hooke", mu=0.01).mu
     (0.01, 0.01)

@@ -19,7 +19,7 @@ class ActiveTension(Ramped, Energy):
     tension: PositivePressure
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which active fibres straighten the muscle, or by which they shorten it if it is free to shorten."""
+        """The distance by which active fibres straighten the muscle, or shorten a muscle that is free to shorten."""
         pull = scene.greatest(self) * self.tension
         return fibre_indicator(scene, pull, scene.straighten(pull))
 

@@ -1,4 +1,4 @@
-"""Collagen across the fibres, in all directions of the plane perpendicular to them; it has no stiffness in compression."""
+"""Collagen in all directions of the plane perpendicular to the fibres, without stiffness in compression."""
 
 from typing import Any, ClassVar
 
@@ -19,13 +19,12 @@ class CollagenAcross(Energy):
     """The mean over all directions a across the fibre of ``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` while ``I = J^(-2/3) a . C a`` is
     above 1, else 0.
 
-    ``k1`` [MPa], ``k2`` without unit. In the plane across the fibre, I is ``mean + spread cos(2 angle)``; the mean is half the
-    trace of C there, ``mean^2 - spread^2`` its determinant; eight angles are summed.
+    ``k1`` [MPa], ``k2`` without unit. In the plane across the fibre, I is ``mean + spread cos(2 angle)``. There the mean is half
+    the trace of C, and ``mean^2 - spread^2`` its determinant. Eight angles are summed.
 
-    Source: integration over the directions of collagen, as Bleiler, Ponte Castaneda and Roehrle 2019,
-    doi 10.1016/j.jmbbm.2019.05.012, do for muscle, which is then stiffer in tension across its fibres than along them; here the
-    directions are only those in the plane. The exponential is that of Holzapfel, Gasser and Ogden 2000,
-    doi 10.1023/A:1010835316564.
+    Source: integration over the directions of collagen, as by Bleiler, Ponte Castaneda and Roehrle 2019, doi
+    10.1016/j.jmbbm.2019.05.012, for muscle, which is then stiffer in tension across its fibres than along them; here only
+    directions in the plane are used. The exponential is taken from Holzapfel, Gasser and Ogden 2000, doi 10.1023/A:1010835316564.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -34,7 +33,7 @@ class CollagenAcross(Energy):
     k2: float = Field(gt=0)
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest, in a shear of the plane across the fibre."""
+        """The stiffness of the body at rest due to the effect, in a shear of the plane across the fibre."""
         return Moduli(shear=self.k1 / 4)
 
     def energy(self, state: State) -> Any:

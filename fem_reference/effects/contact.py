@@ -13,11 +13,12 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 class Contact(Interaction):
     """A pressure that depends on the gap g to each bone (the signed distance, negative inside): 0 beyond the ``smoothing`` d,
-    ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper, k the ``stiffness`` (``fem_reference.problems.contact.ContactLaw``).
+    ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` for deeper points, with k the ``stiffness``
+    (``fem_reference.problems.contact.ContactLaw``).
 
     ``stiffness`` [MPa/mm]: under the pressure p the surface penetrates the bone by at most p / stiffness. ``smoothing`` [mm]: the
     distance at which contact begins. ``bones``: their names, by default all. ``support`` [mm], with ``in_situ`` only: the distance
-    within which a bone may press at rest, through tissue in between that is not meshed, such as a capsule or a bursa; by default it
+    within which a bone may press at rest, through tissue that is not meshed, such as a capsule or a bursa; by default a bone
     presses only where the muscle touches it. ``friction``: the coefficient of Coulomb's law, greater than 0; without it contact is
     frictionless.
     """
@@ -39,10 +40,10 @@ class Contact(Interaction):
         return Indicator(rule, gap, depth, self.stiffness * max(depth, felt - gap, 0.0))
 
     def is_by(self, bone: str) -> bool:
-        """True where the bone of this name is in contact."""
+        """True if the bone of this name is in contact."""
         return self.bones is None or bone in self.bones
 
 
 def among(acting: Iterable[Effect]) -> Contact | None:
-    """The contact among the effects of a scene, None where there is none."""
+    """The contact among the effects of a scene, None if there is none."""
     return next((effect for effect in acting if isinstance(effect, Contact)), None)

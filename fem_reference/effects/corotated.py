@@ -4,7 +4,8 @@ from typing import Any
 
 from fem_reference.effects import LameLaw, State
 
-# Newton steps for the sum of the stretches: their error is 4e-11 of it for stretches from 0.3 to 3, and greater in inverted states.
+# Newton steps for the sum of the stretches: the relative error is 4e-11 for stretches from 0.3 to 3, and greater in inverted
+# states.
 _STEPS = 4
 
 
@@ -13,7 +14,8 @@ class Corotated(LameLaw):
     consistent invertible elasticity, eq. 8).
 
     ``mu``, ``lame``: Lame's parameters [MPa]. ``|F - R|^2`` is ``I1 - 2 s + 3``, where s is the sum of the principal stretches, the
-    greatest root of ``(s^2 - I1)^2 = 4 (I2 + 2 J s)``. For J < 0 four steps to it leave an energy up to 6 % too small.
+    greatest root of ``(s^2 - I1)^2 = 4 (I2 + 2 J s)``. For J < 0, four steps of Newton's method leave an energy up to 6 % too
+    small.
     """
 
     def energy(self, state: State) -> Any:
@@ -21,7 +23,7 @@ class Corotated(LameLaw):
 
 
 def _stretches(state: State) -> Any:
-    """The sum of the principal stretches, by Newton's method from an upper bound. The root is simple, at rest too."""
+    """The sum of the principal stretches, by Newton's method from an upper bound. The root is simple, even at rest."""
     I1, I2, J = state.I1, state.I2, state.J
     s = state.functions.sqrt(I1 + 2 * state.functions.sqrt(3 * I2))
     for _ in range(_STEPS):

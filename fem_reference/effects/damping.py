@@ -1,4 +1,4 @@
-"""Drag of the ground on moving tissue: it keeps a free body from drifting, and slows the departure from an unstable state."""
+"""Drag of the ground on moving tissue: prevents a free body from drifting, and slows the departure from an unstable state."""
 
 from typing import Any, ClassVar
 
@@ -32,7 +32,7 @@ class Damping(Energy):
         return Indicator(rule, stress / scene.shear, lag, stress)
 
     def resultant(self, shape: Shape) -> Wrench | None:
-        """The drag on the whole body."""
+        """The drag on the entire body."""
         found = shape.motion()
         return None if found is None else Wrench(*(-self.coefficient * one for one in found))
 

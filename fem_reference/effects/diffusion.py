@@ -17,7 +17,7 @@ class Diffusion(FieldEffect):
     coefficient: float = Field(gt=0)
 
     def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:  # noqa: ARG002
-        """``k grad psi . grad test``; a flux through the boundary is a condition there."""
+        """``k grad psi . grad test``; a flux through the boundary is a boundary condition."""
         return self.coefficient * sum(a * b for a, b in zip(psi.gradient, test.gradient, strict=True))
 
     def strong(self, psi: FieldState, place: Place) -> Any:  # noqa: ARG002

@@ -25,7 +25,7 @@ class FibreActive(Ramped, Energy):
     ``stress`` [MPa]: the peak active stress; ``optimal_stretch``: the fibre stretch at optimal length; ``ramp``: the activation.
     Source: Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 
-    Valid for ``l`` from 0.4 to 1.6, where that source gives fibres a tension: outside, an activation has no effect.
+    Valid for ``l`` from 0.4 to 1.6, the range in which fibres have a tension by this source: outside, activation has no effect.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -38,7 +38,7 @@ class FibreActive(Ramped, Energy):
         return (Limit("fibre stretch", 0.4 * self.optimal_stretch, 1.6 * self.optimal_stretch),)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which active fibres straighten the muscle, or by which they shorten it if it is free to shorten."""
+        """The distance by which active fibres straighten the muscle, or shorten a muscle that is free to shorten."""
         pull = scene.greatest(self) * self.stress
         return fibre_indicator(scene, pull, scene.straighten(pull))
 
@@ -49,7 +49,7 @@ class FibreActive(Ramped, Energy):
 
 
 def _area(stretch: Any, state: State) -> Any:
-    """The integral of g from 1 to ``stretch``: the outer pieces cancel at 1, as g is symmetric about it."""
+    """The integral of g from 1 to ``stretch``: the outer pieces cancel at 1, as g is symmetric about 1."""
     rising = state.between(0.4, 0.6, stretch) - 0.4
     middle = state.between(0.6, 1.4, stretch) - 1
     falling = state.between(1.4, 1.6, stretch) - 1.6

@@ -1,4 +1,4 @@
-"""Passive muscle fibres: resistance to stretch beyond their optimal length, with a toe region and then a line."""
+"""Passive muscle fibres: resistance to stretch beyond their optimal length, with a toe region followed by a line."""
 
 from typing import Any, ClassVar
 
@@ -25,8 +25,8 @@ class FibrePassive(PassiveFibres):
     fibre stretch at optimal length; ``linear_from``: a value of ``l``. Source: Blemker, Pinsky and Delp 2005,
     doi 10.1016/j.jbiomech.2004.04.009.
 
-    Valid for ``l`` up to 1.6, or up to ``linear_from`` if that is greater: there the active tension of the same source ends, and no
-    data on longer fibres support this law. There is no limit for slack fibres.
+    Valid for ``l`` up to 1.6, or up to ``linear_from`` if that is greater. At 1.6 the active tension of the same source ends, and
+    no data on longer fibres support this law. There is no limit for slack fibres.
     """
 
     example: ClassVar[dict[str, Any]] = {

@@ -1,4 +1,4 @@
-"""Passive fibres by the law of FEBio: resistance to stretch with a toe region, then a line in the stretch."""
+"""Passive fibres by the law of FEBio: resistance to stretch with a toe region followed by a line in the stretch."""
 
 from typing import Any, ClassVar
 
@@ -19,7 +19,7 @@ class FibrePassiveFebio(PassiveFibres):
 
     ``c3``, ``c5`` [MPa], ``c4`` without unit. Source: FEBio Theory Manual, "Transversely Isotropic Hyperelastic"; Weiss, Maker and
     Govindjee 1996, doi 10.1016/0045-7825(96)01035-3. The energy of the toe is an exponential integral, computed here by a
-    Gauss-Legendre rule, whose error is below 1e-12 c3 while ``c4 (linear_from - 1)`` is at most 6 and ``linear_from`` at most 2.
+    Gauss-Legendre rule. Its error is below 1e-12 c3 if ``c4 (linear_from - 1)`` is at most 6 and ``linear_from`` at most 2.
     """
 
     example: ClassVar[dict[str, Any]] = {"c3": "10 kPa", "c4": 12.0, "c5": "3 MPa", "linear_from": 1.3}

@@ -13,8 +13,8 @@ from fem_reference.foundations.units import Angle, PositivePressure
 class HolzapfelOgden(Energy):
     """``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` for each family while it is stretched, with ``I = J^(-2/3) a . C a``.
 
-    ``k1`` [MPa], ``k2`` without unit; ``angle`` [rad]: the unit vectors ``a`` are the fibre direction turned by plus and minus
-    this; ``normal``: the axis of that rotation, of any length and not along a fibre; only its component across the fibre counts.
+    ``k1`` [MPa], ``k2`` without unit; ``angle`` [rad]: the unit vectors ``a`` are the fibre direction turned by plus and minus this
+    angle; ``normal``: the axis of this rotation, of any length and not along a fibre; only its component across the fibre counts.
     Source: Holzapfel, Gasser and Ogden 2000, doi 10.1023/A:1010835316564.
     """
 

@@ -1,4 +1,4 @@
-"""Tension at rest: the given mesh is the muscle in the body, with fibres that are stretched there, in equilibrium."""
+"""Tension at rest: the given mesh is the muscle in the body, in equilibrium with stretched fibres."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
@@ -12,15 +12,16 @@ class InSitu(Prestrain):
     """The energies depend on ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``, l the ``stretch`` along the fibre f. A stress at
     rest balances all effects at the first frame, an activation included, so that ``F = 1`` is in equilibrium there.
 
-    Its energy per rest volume is ``2 mu dev(e) : E + p0 (J - 1)``, ``E = (F^T F - 1) / 2``, with fixed fields ``e`` and ``p0``: it
-    rotates with the body. They are the strain and pressure of an isotropic body under the forces at rest, with the shear and bulk
-    modulus at rest of the scene's effects: of all stresses that balance these forces, this one has the least energy. That body is
-    supported by the springs of attachments, which are extended at rest, and by the bones, which press wherever the muscle touches
-    them or is within ``support`` of them (``contact``), through the tissue in between.
+    The energy of this stress per rest volume is ``2 mu dev(e) : E + p0 (J - 1)``, ``E = (F^T F - 1) / 2``, with fixed fields ``e``
+    and ``p0``, so the stress rotates with the body. ``e`` and ``p0`` are the strain and pressure of an isotropic body under the
+    forces at rest, with the shear and bulk modulus at rest of the scene's effects. Of all stresses that balance these forces, this
+    stress has the least energy. The isotropic body is supported by the springs of attachments, which are extended at rest, and by
+    the bones. Bones press wherever the muscle touches them or is within ``support`` of them (``contact``), through the tissue in
+    between.
 
-    ``stretch``: without unit, above 1 where fibres are taut at rest; 1 where only an activation acts there.
-    Source: Maas, Erdemir, Halloran and Weiss 2016, doi 10.1016/j.jmbbm.2016.04.012, who find by iteration a prestrain with this
-    stretch that is in equilibrium; here its incompatible part is a constant stress, found by one linear problem.
+    ``stretch``: without unit, above 1 if fibres are taut at rest; 1 if only an activation acts at rest.
+    Source: Maas, Erdemir, Halloran and Weiss 2016, doi 10.1016/j.jmbbm.2016.04.012, who find a prestrain in equilibrium with this
+    stretch by iteration; here its incompatible part is a constant stress, found by one linear problem.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -32,7 +33,7 @@ class InSitu(Prestrain):
 
 
 def among(acting: Iterable[object]) -> InSitu | None:
-    """The tension at rest among the effects of a scene, None where there is none."""
+    """The tension at rest among the effects of a scene, None if there is none."""
     return next((effect for effect in acting if isinstance(effect, InSitu)), None)
 
 
@@ -43,7 +44,7 @@ def moduli_of(effects: Sequence[Effect]) -> tuple[float, float]:
 
 
 def balancing(state: State, slopes: Sequence[Sequence[Any]], pressure: Any, shear: Any) -> Any:
-    """The energy per rest volume [MPa] of the stress at rest at ``state``, whose F is the whole deformation gradient; ``e`` is the
+    """The energy per rest volume [MPa] of the stress at rest at ``state``, whose F is the total deformation gradient; ``e`` is the
     symmetric part of ``slopes`` (3, 3), mu the modulus ``shear`` [MPa] and p0 the ``pressure`` [MPa].
     """
     C, mean = state.C, sum(slopes[i][i] for i in range(3)) / 3

@@ -1,4 +1,6 @@
-"""Near-incompressibility by a penalty on volume change, without a pressure unknown, which locks where the mixed form does not."""
+"""Near-incompressibility by a penalty on volume change, without a pressure unknown; elements may lock that do not lock in the mixed
+form.
+"""
 
 from typing import Any
 

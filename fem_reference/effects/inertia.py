@@ -13,12 +13,11 @@ from fem_reference.foundations.units import Density
 class Inertia(Energy):
     """A force per rest volume of ``-density a``, with a the acceleration, integrated by an implicit method of second order.
 
-    It is the member of the generalised-alpha family in which stresses are those at the end of a step (Wood, Bossak and Zienkiewicz
-    1980, doi 10.1002/nme.1620151011; Chung and Hulbert 1993, doi 10.1115/1.2900803, with alpha_f = 0):
-    ``alpha = (r - 1) / (r + 1)``, ``gamma = 1/2 - alpha``, ``beta = (1 - alpha)^2 / 4``. A step scales the shortest waves by r, the
-    ``spectral_radius``: 1 keeps them (the trapezoidal rule), 0 removes them at once. Long waves keep their energy. At the end of a
-    step the sum of ``density (1 + r) rate^2 |u - predicted|^2`` and all other energies is least: a potential of the step, not a
-    stored energy.
+    The method is the member of the generalised-alpha family with stresses taken at the end of a step (Wood, Bossak and Zienkiewicz
+    1980, doi 10.1002/nme.1620151011; Chung and Hulbert 1993, doi 10.1115/1.2900803, with alpha_f = 0): ``alpha = (r - 1) / (r +
+    1)``, ``gamma = 1/2 - alpha``, ``beta = (1 - alpha)^2 / 4``. A step scales the shortest waves by r, the ``spectral_radius``: 1
+    keeps them (the trapezoidal rule), 0 removes them at once. Long waves keep their energy. The end of a step minimises the sum of
+    ``density (1 + r) rate^2 |u - predicted|^2``, which is a potential of the step and no stored energy, and all other energies.
 
     ``density``: at rest [tonne/mm^3]; ``spectral_radius``: from 0 to 1.
     """
@@ -63,7 +62,7 @@ class Inertia(Energy):
         return v + seconds * ((1 - gamma) * a + gamma * after), after
 
     def begun(self, u: Any, seconds: float) -> Any:
-        """The acceleration of a body at rest that moves by ``u`` in ``seconds`` so short that forces do not change."""
+        """The acceleration of a body at rest that moves by ``u`` in a time ``seconds`` too short for forces to change."""
         return 2 * (1 + self.spectral_radius) * u / seconds**2
 
     def _rule(self) -> tuple[float, float, float]:

@@ -2,9 +2,8 @@
 
 from typing import Any, ClassVar
 
-from pydantic import model_validator
-
 from fem_reference.effects import Energy, Moduli, State
+from fem_reference.foundations.records import rule
 from fem_reference.foundations.units import Pressure
 
 
@@ -18,11 +17,7 @@ class MooneyRivlin(Energy):
     c1: Pressure
     c2: Pressure
 
-    @model_validator(mode="after")
-    def _check_modulus(self) -> "MooneyRivlin":
-        if self.c1 + self.c2 <= 0:
-            raise ValueError("c1 + c2 above zero")
-        return self
+    _check_modulus = rule(lambda one: one.c1 + one.c2 > 0, "c1 + c2 above zero")
 
     def moduli(self) -> Moduli:
         return Moduli(shear=2 * (self.c1 + self.c2))

@@ -1,4 +1,4 @@
-"""Fluid pressure on a part of the surface, which stays perpendicular to the surface as that moves (a follower load)."""
+"""Fluid pressure on a part of the surface, always perpendicular to the moving surface (a follower load)."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar
@@ -12,24 +12,24 @@ from fem_reference.foundations.loads import Shape, Wrench
 class Pressure(Ramped, Load):
     """``-amount p J F^-T N``, with N the outward normal at rest: a pressure on the present surface, by Nanson's formula.
 
-    ``on``: the part of the surface; ``pressure``: p [MPa], inwards where it is positive.
+    ``on``: the part of the surface; ``pressure``: p [MPa], inwards if positive.
 
-    On the whole surface of a body that may shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is 1 - p / K exactly. A
+    On the entire surface of a body that can shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is exactly 1 - p / K. A
     clamped part keeps its size, and the body around it is sheared: in a cube of side L with one clamped triangle of legs a, V/V0 is
-    greater by 0.15 mu / K (a / L)^3 p / K: for example, 0.9002 instead of 0.9 if a is L/2 and K is 10 mu.
+    greater by 0.15 mu / K (a / L)^3 p / K. For example, it is 0.9002 instead of 0.9 if a is L/2 and K is 10 mu.
     """
 
     example: ClassVar[dict[str, Any]] = {"pressure": "8 kPa"}
     pressure: units.Pressure
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which it compresses the muscle's thickness."""
+        """The distance by which the pressure compresses the muscle's thickness."""
         load = scene.greatest(self) * abs(self.pressure)
         part = load / scene.shear
         return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3, load)
 
     def resultant(self, shape: Shape) -> Wrench | None:
-        """The load on the whole part in its present shape."""
+        """The load on the entire part in its present shape."""
         found = shape.facing(self.on)
         return None if found is None else Wrench(*(-self.pressure * one for one in found))
 

@@ -1,4 +1,4 @@
-"""Isotropic elastic law of two squared constraints, as in Newton's XPBD solver, which does not resist shear at rest."""
+"""Isotropic elastic law of two squared constraints, as in Newton's XPBD solver, without resistance to shear at rest."""
 
 from typing import Any, ClassVar
 
@@ -19,7 +19,7 @@ class SquaredInvariants(Energy):
     lame: PositivePressure
 
     def moduli(self) -> Moduli:
-        """The stiffness that it gives the body at rest: (I1 - 3)^2 is 4 (tr e)^2 for small strains e."""
+        """The stiffness of the body at rest due to the effect: (I1 - 3)^2 is 4 (tr e)^2 for small strains e."""
         return Moduli(bulk=self.lame + 4 * self.mu)
 
     def energy(self, state: State) -> Any:

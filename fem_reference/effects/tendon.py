@@ -7,12 +7,13 @@ from fem_reference.foundations.units import PositiveLength, Stiffness
 
 
 class Tendon(Interaction):
-    """Tension ``k (l - l0)`` along straight lines that are longer than at rest. They run from the surface within ``reach`` of the
-    ends of fibres that continue as the ``tendon`` of an attachment to its point on the bone; slack lines do not push.
+    """Tension ``k (l - l0)`` along straight lines that are longer than at rest; slack lines do not push. The lines run from the
+    surface within ``reach`` of the ends of fibres that continue as the ``tendon`` of an attachment, to the point of this tendon on
+    the bone.
 
-    ``on``: that attachment; ``stiffness`` [N/mm]: that of all lines together, of which each has a share k by its area: ``E A / l0``
-    for a tendon of modulus E and cross-section A; ``reach`` [mm]. A tendon is slack at rest and not allowed with ``in_situ``.
-    Source: Zajac 1989 (Crit. Rev. Biomed. Eng. 17:359), the tendon as a spring in series, here linear.
+    ``on``: the attachment; ``stiffness`` [N/mm]: the stiffness of all lines together, divided among them by area into shares k: ``E
+    A / l0`` for a tendon of modulus E and cross-section A; ``reach`` [mm]. A tendon is slack at rest and not allowed with
+    ``in_situ``. Source: Zajac 1989 (Crit. Rev. Biomed. Eng. 17:359), the tendon as a spring in series, here linear.
     """
 
     example: ClassVar[dict[str, Any]] = {"on": "insertion", "stiffness": "20 N/mm", "reach": "15 mm"}

@@ -1,4 +1,4 @@
-"""Contact of the muscles of a scene with each other, or of a single one with itself; attached parts are exempt."""
+"""Contact of the muscles of a scene with each other, or of a single muscle with itself; attached parts are exempt."""
 
 from collections.abc import Iterable
 from typing import Any, ClassVar
@@ -10,12 +10,12 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
 class MuscleContact(Interaction):
-    """The pressure law of ``contact``, applied to the gap between two muscles, on both alike, or between places of a single one,
-    with any sliding (``fem_reference.problems.touching.Touching``).
+    """The pressure law of ``contact``, applied equally to both sides of the gap between two muscles, or between places of a single
+    muscle, with any sliding (``fem_reference.problems.touching.Touching``).
 
-    ``stiffness`` [MPa/mm]: under the pressure p the two, or the two places, overlap by at most p / stiffness. ``smoothing`` [mm]:
+    ``stiffness`` [MPa/mm]: under the pressure p the two sides overlap by at most p / stiffness. ``smoothing`` [mm]:
     the distance at which contact begins, and the greatest overlap with another muscle, or with itself, that is allowed at rest.
-    ``friction``: the coefficient of Coulomb's law, greater than 0; without it contact is frictionless. Of several muscles, each
+    ``friction``: the coefficient of Coulomb's law, greater than 0; without it contact is frictionless. Each of several muscles
     touches the others but not itself.
     """
 
@@ -26,5 +26,5 @@ class MuscleContact(Interaction):
 
 
 def among(acting: Iterable[Effect]) -> MuscleContact | None:
-    """The contact of muscles among the effects of a scene, None where there is none."""
+    """The contact of muscles among the effects of a scene, None if there is none."""
     return next((effect for effect in acting if isinstance(effect, MuscleContact)), None)

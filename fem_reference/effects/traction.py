@@ -20,13 +20,13 @@ class Traction(Ramped, Load):
     force: PressureVector
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which it extends the muscle."""
+        """The distance by which the load extends the muscle."""
         load = scene.greatest(self) * math.hypot(*self.force)
         part = load / scene.shear
         return Indicator("traction over the shear modulus", part, part * scene.length / 3, load)
 
     def resultant(self, shape: Shape) -> Wrench:
-        """The load on the whole part."""
+        """The load on the entire part."""
         return dead(self.force, shape, self.on)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:  # noqa: ARG002

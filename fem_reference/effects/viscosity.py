@@ -11,11 +11,11 @@ from fem_reference.foundations.units import Viscosity as Coefficient
 
 
 class Viscosity(Energy):
-    """A Cauchy stress of ``2 eta D``, D the rate of deformation with its volumetric part, 0 in incompressible material.
+    """A Cauchy stress of ``2 eta D``, D the rate of deformation with its volumetric part, which is 0 in incompressible material.
 
     Over a load step D is ``rate e`` (implicit Euler), ``e = (f^T f - 1)/2`` the Green strain of ``f = F F_before^-1``, and the
-    stress is the derivative of ``eta rate |e|^2`` per volume before the step: a potential of the step, not a stored energy, which
-    rotations do not change. It agrees with the law above to first order in the step.
+    stress is the derivative of ``eta rate |e|^2`` per volume before the step. This is a potential of the step, not a stored energy,
+    and rotations do not change it. The stress agrees with the law above to first order in the step.
 
     ``eta``: [MPa s].
     """

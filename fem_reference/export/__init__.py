@@ -32,10 +32,10 @@ _NO_DIFFERENCE = "no springs at points of the surface, no bone that overlaps the
 
 
 def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: Format) -> list[str]:
-    """Write the problem that ``build`` makes of a ``case`` into ``folder``, whole or not at all; the names of its files.
+    """Write the problem that ``build`` makes of a ``case`` into ``folder``, completely or not at all; the names of its files.
 
-    ``"febio"`` adds FEBio's own file to the open ones, and warns where FEBio's model differs. Of several muscles each has a folder
-    with its name, and FEBio one file of all. InputError where the folder is not free, or FEBio lacks an effect of the case.
+    ``"febio"`` adds FEBio's file to the open formats, and warns if FEBio's model differs. Each of several muscles has a folder with
+    its name, and FEBio has one file for all muscles. InputError if the folder is not free, or FEBio lacks an effect of the case.
     """
     if not isinstance(form, str) or form not in FORMATS:
         raise InputError("form", repr(form), f"one of {', '.join(FORMATS)}")
@@ -86,7 +86,7 @@ def _write_several(case: Case, problem: MusclesProblem, folder: Path, form: Form
 
 
 def _write_febio(case: Case, problem: CaseProblem, folder: Path) -> None:
-    """Write FEBio's own file, and a text on the differences of its model."""
+    """Write FEBio's file, and a text on the differences of its model."""
     if isinstance(problem, MusclesProblem):
         differences = febio_several.notes(problem)
         febio.write_model(febio_several.model(problem), folder)

@@ -1,8 +1,8 @@
 """A problem as FEBio's input file (febio_spec 4.0): quadratic tetrahedra, rigid bones moved by load curves, sliding contact.
 
-Written from FEBio's feature manual (febiosoftware/febio-feature-manual) and the sources of FEBio and FEBio Studio that read and
-write such files; FEBio 4.11 was run with exported files. FEBIO.md says what is the same, with measured differences. Time is the
-frame number minus the first.
+Based on FEBio's feature manual (febiosoftware/febio-feature-manual) and the sources of FEBio and FEBio Studio that read and write
+such files; FEBio 4.11 was run with exported files. FEBIO.md lists what is equal, and measured differences. Time is the frame number
+minus the first frame number.
 """
 
 from collections.abc import Iterable
@@ -33,14 +33,14 @@ from fem_reference.scenes.muscle import MuscleCase
 
 # The effects that FEBio has in the same form.
 SAME = (NeoHooke, MooneyRivlin, Incompressible, IncompressiblePenalty, FibrePassive, FibrePassiveFebio, Contact)
-LONGEST_STEP = 2.0  # the longest step [frame numbers], as in the runs whose results FEBIO.md compares
+LONGEST_STEP = 2.0  # the longest step [frame numbers], as in the runs that FEBIO.md compares
 # Newton's method stops at these shares of displacement and energy of the step's first correction: with a dtol of 1e-3
 # the residual force is 0.4 %.
 TOLERANCES = {"dtol": 1e-4, "etol": 1e-5}
 
 
 def check(case: MuscleCase) -> None:
-    """Raise InputError where FEBio lacks an effect of the case, or has it in another form."""
+    """Raise InputError if FEBio lacks an effect of the case, or has it in another form."""
     for i, effect in enumerate(case.effects):
         if not isinstance(effect, SAME):
             want = f"what FEBio has in the same form: {', '.join(name_of(kind) for kind in SAME)}"
@@ -131,7 +131,7 @@ def _step(problem: MuscleProblem) -> float:
 
 
 def _domains(root: Element, problem: MuscleProblem) -> None:
-    """Add the formulation of the muscle's elements; bones, and the copies of areas that springs pull on, are rigid."""
+    """Add the formulation of the muscle's elements; bones, and the copies of areas on which springs pull, are rigid."""
     domains = SubElement(root, "MeshDomains")
     mixed = any(isinstance(effect, Incompressible) for effect in problem.effects)
     kind = "three-field-solid" if mixed else "elastic-solid"
@@ -168,13 +168,13 @@ def _motions(root: Element, problem: MuscleProblem) -> None:
 
 
 def _curve_numbers(problem: MuscleProblem) -> dict[str, int]:
-    """The number of the load curve of each bone that moves: from 2 on without gaps, as FEBio takes it for a place in its list."""
+    """The number of the load curve of each bone that moves: from 2 on without gaps, as FEBio uses it as an index of its list."""
     moving = [bone.name for bone in problem.bones if bone.motion is not None]
     return {name: number for number, name in enumerate(moving, start=2)}
 
 
 def _curves(root: Element, problem: MuscleProblem) -> None:
-    """Add curve 1 with the times at which FEBio must stop; then for each bone that moves the amount of its motion [rad, mm]."""
+    """Add curve 1 with the times at which FEBio must stop, then for each moving bone a curve of its motion [rad, mm]."""
     data, (first, *_, last) = SubElement(root, "LoadData"), problem.frames
     _curve(data, 1, "STEP", [(frame - first, _step(problem)) for frame in problem.frames])
     numbers = _curve_numbers(problem)

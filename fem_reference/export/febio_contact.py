@@ -1,9 +1,9 @@
-"""Contact with bones and springs of attachments in FEBio's input file, and the differences of the model there.
+"""Contact with bones and springs of attachments in FEBio's input file, and the differences of FEBio's model.
 
 FEBio's ``tied-elastic`` pulls with a traction: its penalty times the vector from a point of the first surface to the point of the
-second that was nearest at rest, without the gap that was there at rest. It integrates over the first surface as that is now: a
-rigid copy of the area attached, which keeps its rest area. So it is the springs of an attachment: their stiffness per rest area,
-the same in all directions. Springs at points of the muscle's surface are small rigid triangles at the nearest points of the tets.
+second surface that was nearest at rest, minus this vector at rest. The traction is integrated over the present first surface, a
+rigid copy of the attached area, which keeps its rest area. So it acts as the springs of an attachment: a stiffness per rest area,
+equal in all directions. Springs at points of the muscle's surface are small rigid triangles at the nearest points of the tets.
 """
 
 from collections.abc import Iterator
@@ -21,13 +21,14 @@ from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices
 
 SEARCH_RADIUS = 5.0  # FEBio looks for contact up to this depth inside a bone [mm]
-# The greatest initial pressure of an overlap at rest, in shear moduli of the matrix: in gluteus_maximus_anatomical, with up to 34,
-# FEBio never took its first step with a search radius of 5 mm; a radius of 0.1 mm, which means up to 10, helped.
+# The greatest initial pressure of an overlap at rest, in shear moduli of the matrix. In gluteus_maximus_anatomical a search radius
+# of 5 mm gives up to 34, and FEBio did not complete its first step; a radius of 0.1 mm gives up to 10, and it did.
 _AT_ONCE = 10.0
 SPRING_SEARCH_RADIUS = 1.0  # the search radius of springs [mm], whose two surfaces coincide at rest
 # Contact by penalty alone, in one pass, with the given penalty and the complete tangent.
 PENALTY = {"laugon": 0, "two_pass": 0, "auto_penalty": 0, "symmetric_stiffness": 0}
-# FEBio 4.11 has run springs over facets alone: 5.3 and 8.8 % of the force on the femur off, on gluteus_medius and gluteus_maximus.
+# FEBio 4.11 has only run springs over facets: the force on the femur differs by 5.3 % on gluteus_medius and 8.8 % on
+# gluteus_maximus.
 MEASURED = (
     "FEBio 4.11 has not run springs at points yet. In the reference, on gluteus_medius at frame 20, those at the nearest points "
     "differ from its own by 0.4 % of the force on the femur and 0.01 mm (rms), with tetrahedra of 12 mm by 1.2 % and 0.04 mm; over "
@@ -37,12 +38,12 @@ _FELT = 1e-3  # the least overlap at rest that is reported [mm]
 
 
 def has_contact(problem: MuscleProblem) -> bool:
-    """True where the file has a section ``Contact``, whose tangent is not symmetric."""
+    """True if the file has a section ``Contact``, whose tangent is not symmetric."""
     return bool(problem.obstacles or febio_mesh.by_springs(problem))
 
 
 def add_contact(root: Element, problem: MuscleProblem) -> None:
-    """The section ``Contact``, where something acts between surfaces."""
+    """The section ``Contact``, if something acts between surfaces."""
     if not has_contact(problem):
         return
     contacts = SubElement(root, "Contact")
@@ -64,7 +65,7 @@ def pair(contacts: Element, kind: str, name: str, settings: dict[str, float]) ->
 
 
 def penalty(problem: MuscleProblem, attached: AttachedVertices) -> float:
-    """The penalty [MPa/mm] of springs: over facets their stiffness; at points greater, as their triangles are smaller."""
+    """The penalty [MPa/mm] of springs: over facets their stiffness; at points a greater value, as the triangles are smaller."""
     assert attached.stiffness is not None  # the attachment is by springs
     return attached.stiffness / (febio_mesh.SHRUNK if attached.attachment in problem.attached_skins else 1.0)
 
@@ -81,8 +82,8 @@ def overlaps(problem: MuscleProblem) -> dict[str, float]:
 
 
 def search_radius(problem: MuscleProblem, deep: float) -> float:
-    """Depth [mm] inside a bone to which FEBio looks for contact, where the muscle is ``deep`` [mm] in it at rest: less where that
-    would press at once with more than the matrix bears.
+    """Depth [mm] inside a bone to which FEBio looks for contact, if the muscle is ``deep`` [mm] in the bone at rest. It is less if
+    contact would at once press with more than the matrix withstands.
     """
     assert problem.contact is not None  # called only with contact
     softest = min(sum(matrix_constants(part.effects)[key] for key in ("c1", "c2")) for part in parts(problem))
@@ -99,7 +100,7 @@ def notes(problem: MuscleProblem) -> list[str]:
 
 
 def _springs(problem: MuscleProblem, attached: AttachedVertices) -> str:
-    """The distance of FEBio's springs from those of the reference, and their stiffness in total and against rotation."""
+    """The distance between the springs of FEBio and of the reference, and their stiffness in total and against rotation."""
     skin, found = problem.attached_skins[attached.attachment], febio_mesh.spring_points(problem, attached)
     points, areas = found.points, corner_areas(found.corners) / febio_mesh.SHRUNK
     assert attached.stiffness is not None  # one by springs

@@ -32,7 +32,7 @@ def add_materials(root: Element, problem: MuscleProblem) -> None:
 
 
 def _muscle(materials: Element, number: int, part: Piece) -> None:
-    """Add one material if FEBio has one for all effects; with ``fibre_passive`` a mixture, whose stresses FEBio sums."""
+    """Add one material if FEBio has one for all effects; with ``fibre_passive`` add a mixture, whose stresses FEBio sums."""
     matrix, volume = matrix_constants(part.effects), volume_constants(part.effects)
     kind = "trans iso Mooney-Rivlin" if "c3" in matrix else "Mooney-Rivlin"
     passive = [effect for effect in part.effects if isinstance(effect, FibrePassive)]
@@ -61,7 +61,7 @@ def volume_constants(effects: Sequence[Effect]) -> dict[str, float]:
 
 
 def matrix_constants(effects: Sequence[Effect]) -> dict[str, float]:
-    """The constants [MPa, 1] of FEBio's ``Mooney-Rivlin``, with ``fibre_passive_febio`` of its ``trans iso Mooney-Rivlin``."""
+    """The constants [MPa, 1] of FEBio's ``Mooney-Rivlin``, or with ``fibre_passive_febio`` of ``trans iso Mooney-Rivlin``."""
     found = {"c1": 0.0, "c2": 0.0}
     for effect in effects:
         if isinstance(effect, NeoHooke):
@@ -77,7 +77,7 @@ def matrix_constants(effects: Sequence[Effect]) -> dict[str, float]:
 
 def fibre_constants(effect: FibrePassive) -> dict[str, float]:
     """The constants [MPa, 1] of FEBio's ``muscle material`` that leave only its passive fibres: no shear moduli (``g1``, ``g2``,
-    ``g3``), no activation. Its ``lam_max`` is a stretch relative to rest, ``linear_from`` relative to the optimal length.
+    ``g3``), no activation. FEBio's ``lam_max`` is a stretch relative to rest, ``linear_from`` is relative to the optimal length.
     """
     off = {"g1": 0.0, "g2": 0.0, "g3": 0.0, "activation": 0.0}
     toe = {"p1": effect.p1, "p2": effect.p2, "Lofl": effect.optimal_stretch, "smax": effect.stress}

@@ -16,7 +16,7 @@ from fem_reference.problems.setup import AttachedVertices, Bone
 
 # The pairs of corners between which the last six nodes of a tet10 lie; the first three pairs are also those of a tri6.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
-FACING = [0, 2, 1, 5, 4, 3]  # the nodes of a tri6 whose normal is turned round
+FACING = [0, 2, 1, 5, 4, 3]  # the nodes of a tri6 whose normal is reversed
 # Springs at points are small rigid triangles of this share of the points' areas; their penalty is divided by this share.
 SHRUNK = 0.01
 _LEAST_AREA = 1e-6  # a point with less than this share of the greatest area has no spring
@@ -46,12 +46,12 @@ def vector(values: Iterable[float]) -> str:
 
 
 def bone_id(bone: Bone) -> str:
-    """The name of a bone in the file, which its material and its elements have."""
+    """The name of a bone in the file, of its material and of its elements."""
     return f"bone_{bone.name}"
 
 
 def springs_id(attached: AttachedVertices) -> str:
-    """The name of the springs of an attachment in the file, which their shells on the bone and their surfaces have."""
+    """The name of the springs of an attachment in the file, of their shells on the bone and of their surfaces."""
     return f"springs_{attached.attachment}"
 
 
@@ -86,7 +86,7 @@ def among(facets: Ints, others: Ints) -> NDArray[np.bool_]:
 
 
 def free_facets(problem: MuscleProblem) -> Ints:
-    """The facets (m, 3) of tets in contact: those not attached whose middle is not exempt; InputError without any."""
+    """The facets (m, 3) of tets in contact: not attached, and with a middle that is not exempt; InputError if there are none."""
     outer, _ = boundary(problem.mesh.tets)
     attached = np.concatenate([np.zeros((0, 3), np.int64), *problem.mesh.facets.values()])
     loose = outer[~among(outer, attached)]
@@ -100,8 +100,8 @@ def free_facets(problem: MuscleProblem) -> Ints:
 
 
 class SpringPoints(NamedTuple):
-    """Points of springs on the tetrahedra: ``of`` (n,) those of the attached skin, the nearest ``points`` (n, 3) [mm] to these on
-    boundary ``facets`` (n, 3), and small triangles with ``corners`` (n, 3, 3) [mm] about them that face these.
+    """Points of springs on the tetrahedra. ``of`` (n,): the points of the attached skin. ``points`` (n, 3) [mm]: their nearest
+    points on boundary ``facets`` (n, 3). ``corners`` (n, 3, 3) [mm]: small triangles about ``points`` that face the attached skin.
     """
 
     of: Ints
@@ -112,7 +112,7 @@ class SpringPoints(NamedTuple):
 
 def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringPoints:
     """The points of springs that act at points of the muscle's surface. ``tied-elastic`` subtracts the gap at rest, so a triangle
-    with the share ``SHRUNK`` of a point's area, in the plane of its facet, is a spring at that point.
+    with the share ``SHRUNK`` of the area of a point, in the plane of its facet, acts as a spring at this point.
     """
     skin, outer = problem.attached_skins[attached.attachment], boundary(problem.mesh.tets)[0]
     of = np.flatnonzero(skin.areas > _LEAST_AREA * skin.areas.max(initial=0.0))
@@ -128,7 +128,7 @@ def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringP
 
 
 class Mesh:
-    """Nodes, elements, node sets and surfaces; node numbers of FEBio begin at 1, with those of the muscle."""
+    """Nodes, elements, node sets and surfaces; node numbers of FEBio begin at 1, with the nodes of the muscle."""
 
     def __init__(self, problem: MuscleProblem) -> None:
         self.problem = problem
@@ -172,7 +172,7 @@ class Mesh:
         return self.curved(self.outer[among(self.outer, self.problem.mesh.facets[attached.attachment])])
 
     def _copy(self, attached: AttachedVertices) -> tuple[str, Floats, Ints]:
-        """Kind, points (n, 3) [mm] and triangles that coincide with the area attached, or with parts of it about the points of
+        """Kind, points (n, 3) [mm] and triangles that coincide with the attached area, or with parts of it about the points of
         springs, and face it, as FEBio's pairs must.
         """
         if attached.attachment in self.problem.attached_skins:
@@ -199,7 +199,7 @@ class Mesh:
             self.pair(mesh, f"{name}_pair", "muscle_free", f"{name}_surface")
 
     def _tied(self, mesh: Element, attached: AttachedVertices, copy: Ints) -> None:
-        """Add the area attached, and its rigid copy as the primary surface, over which FEBio integrates."""
+        """Add the attached area, and its rigid copy as the primary surface, over which FEBio integrates."""
         name = springs_id(attached)
         self.surface(mesh, f"{name}_muscle", "tri6", self._area(attached))
         self.surface(mesh, f"{name}_bone", f"tri{copy.shape[1]}", copy)

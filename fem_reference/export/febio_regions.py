@@ -1,6 +1,6 @@
 """Regions in FEBio's input file: tetrahedra with nearly the same parameters are a part with one material.
 
-FEBio takes the bulk modulus of an uncoupled material as one number, so that no map of element data can carry a region.
+The bulk modulus of an uncoupled material in FEBio is one number, so a map of element data cannot represent a region.
 """
 
 from dataclasses import dataclass
@@ -29,9 +29,10 @@ SCALED: dict[type[Effect], tuple[str, ...]] = {
     FibrePassive: ("stress",),
     FibrePassiveFebio: ("c3", "c5"),
 }
-# Parameters in a part differ by at most this factor; those of fibres below this share of the greatest count as equal to it.
+# Parameters in a part differ by at most this factor; fibre parameters below this share of the greatest count as equal to this
+# share.
 FACTOR, _LEAST = 1.2, 0.01
-# The parameters of fibres, which end where a region does.
+# The parameters of fibres, which end at the border of a region.
 _OF_FIBRES = ("stress", "c3", "c5")
 # The points of a quadrature of degree 2 in a tetrahedron, by the shares of its corners.
 _NEAR, _FAR = (5 + 3 * 5**0.5) / 20, (5 - 5**0.5) / 20
@@ -40,7 +41,7 @@ _POINTS = np.full((4, 4), _FAR) + (_NEAR - _FAR) * np.eye(4)
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Tetrahedra ``cells`` (k,) of one material, by its ``name``, and the ``effects`` in it, times their mean share there."""
+    """Tetrahedra ``cells`` (k,) of one material, by its ``name``, and its ``effects``, multiplied by their mean share there."""
 
     name: str
     cells: Ints
@@ -59,7 +60,7 @@ def shares(problem: MuscleProblem) -> dict[str, Floats]:
 
 @lru_cache(maxsize=8)
 def parts(problem: MuscleProblem) -> tuple[Piece, ...]:
-    """The parts of a muscle, the largest first; one where no effect has a region."""
+    """The parts of a muscle, the largest first; a single part if no effect has a region."""
     known = shares(problem)
     if not known:
         return (Piece(MUSCLE, np.arange(len(problem.mesh.tets)), problem.effects),)
@@ -92,7 +93,7 @@ def _levels(key: str, values: Floats) -> Ints:
 
 
 def _scaled(effect: Effect, share: float) -> Effect | None:
-    """The ``effect`` times its ``share``; None where the share is 0."""
+    """The ``effect`` times its ``share``; None if the share is 0."""
     keys = SCALED.get(type(effect), ())
     if share <= 0 and keys:
         return None
@@ -100,7 +101,7 @@ def _scaled(effect: Effect, share: float) -> Effect | None:
 
 
 def note(problem: MuscleProblem) -> list[str]:
-    """A sentence on the parts, where there are regions."""
+    """A sentence on the parts, if there are regions."""
     many = len(parts(problem))
     text = (
         f"regions are {many} materials, each in tetrahedra whose parameters are within a factor of {FACTOR:g} (those of "

@@ -1,4 +1,4 @@
-"""Several muscles as one input file of FEBio: the model of each, with bones of its own, and contact between them."""
+"""Several muscles as one input file of FEBio: the model of each muscle, with its own bones, and contact between the muscles."""
 
 from xml.etree.ElementTree import Element
 
@@ -6,10 +6,10 @@ from fem_reference.export import febio, febio_contact, febio_mesh
 from fem_reference.geometry.interpenetration import penetration, skin_of
 from fem_reference.problems.muscles import MusclesProblem
 
-# Attributes that name or refer to something, and tags whose text does.
+# Attributes, and tags with text, that name or refer to something.
 _ATTRIBUTES = ("name", "mat", "node_set", "elem_set", "surface_pair")
 _TEXTS = ("primary", "secondary", "rb")
-# Entries that are numbered over all muscles, and those whose text is numbers of nodes.
+# Entries that are numbered over all muscles, and entries whose text consists of node numbers.
 _NUMBERED = {"node": "node", "elem": "elem", "material": "material", "load_controller": "curve"}
 _OF_NODES = ("elem", "tri3", "tri6", "NodeSet")
 _ONCE = ("Module", "Control")  # sections that are the same for all
@@ -18,7 +18,7 @@ _FIRST = ("Nodes", "Elements")  # the entries that come first in a mesh
 
 
 def model(problem: MusclesProblem) -> Element:
-    """The whole input file; all names of a muscle begin with its own name, as in ``deep_muscle``."""
+    """The whole input file; all names of a muscle begin with the name of the muscle, as in ``deep_muscle``."""
     root = Element("febio_spec", version="4.0")
     sections = {tag: Element(tag) for tag in _ORDER}
     before = dict.fromkeys(_NUMBERED.values(), 0)
@@ -46,7 +46,7 @@ def _found(root: Element, tag: str) -> Element:
 
 
 def _add(known: Element, more: Element) -> None:
-    """Add the entries of a section of another muscle; of its output only what is logged."""
+    """Add the entries of a section of another muscle; from its output section only the logged data."""
     if known.tag in _ONCE and (len(known) or known.attrib):
         return
     known.attrib |= more.attrib
@@ -57,7 +57,7 @@ def _add(known: Element, more: Element) -> None:
 
 
 def _renamed(root: Element, name: str, before: dict[str, int]) -> None:
-    """Put the ``name`` of a muscle before all its names, and count its numbers on from those ``before``, which are updated."""
+    """Put the ``name`` of a muscle before all its names, and continue the numbers from ``before``, which are updated."""
     most = dict(before)
     for entry in root.iter():
         for key in set(_ATTRIBUTES) & set(entry.keys()):
@@ -79,8 +79,8 @@ def _renamed(root: Element, name: str, before: dict[str, int]) -> None:
 
 
 def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
-    """Add contact between each two muscles that may touch: in two passes, each with half the stiffness, as each side has half of
-    it in the reference.
+    """Add contact between each two muscles that may touch: in two passes, each with half the stiffness, as in the reference each
+    side has half of the stiffness.
     """
     if not problem.pairs:
         return

@@ -1,4 +1,4 @@
-"""The new folder of an export, written whole or not at all, and its texts, whose templates are beside this module."""
+"""The new folder of an export, written completely or not at all, and its texts; their templates are beside this module."""
 
 import os
 import shutil
@@ -22,7 +22,7 @@ def check(folder: Path) -> None:
 
 @contextmanager
 def new_folder(folder: Path) -> Iterator[Path]:
-    """A folder to write into, which becomes ``folder`` on success and is removed otherwise; InputError where that is not free."""
+    """A folder to write into, renamed to ``folder`` on success and removed otherwise; InputError if ``folder`` is not free."""
     folder = folder.resolve()
     check(folder)
     files.clear(folder)

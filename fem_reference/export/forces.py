@@ -60,8 +60,8 @@ def _rows(comparison: Comparison, run: Run, bone: Bone) -> Iterator[tuple[object
 
 
 def applied(run: Run, bone: Bone, setup: Setup) -> Floats:
-    """Points of application (f, 3) [mm] of the force on a ``bone``, NaN where it is 0: the points of the central axis, about which
-    the moment is along the force, that are nearest to the middle of the attachment, or to the origin for a bone without one.
+    """Points of application (f, 3) [mm] of the force on a ``bone``, NaN if it is 0: the points of the central axis, about which the
+    moment is along the force, that are nearest to the middle of the attachment, or to the origin for a bone without an attachment.
     """
     attached = [one.vertices for one in setup.attached if one.bone.name == bone.name]
     vertices = np.concatenate(attached) if attached else np.zeros(0, np.int64)
@@ -76,7 +76,7 @@ def applied(run: Run, bone: Bone, setup: Setup) -> Floats:
 
 
 def block(run: Run, setup: Setup, i: int) -> DataBlock | None:
-    """Points of application with the vectors ``force`` [N] at the frame of index ``i``; None where the run has no force there."""
+    """Points of application with the vectors ``force`` [N] at the frame of index ``i``; None if the run has no force there."""
     known = [bone for bone in setup.bones if bone.name in vector_names(run.scalars, "force_on_")]
     points = np.array([applied(run, bone, setup)[i] for bone in known]).reshape(-1, 3)
     forces = np.array([run.force(bone.name)[i] for bone in known]).reshape(-1, 3)

@@ -1,7 +1,7 @@
 """Runs of a case as one collection for ParaView: named blocks in the rest state, which the array ``displacement`` moves.
 
 forces.csv               force, its point of application, moment and moment arm of each run by frame and bone
-runs.pvd                 the time of each frame [s], its number where the case has no time
+runs.pvd                 the time of each frame [s], or its number if the case has no time
 frames/frame_0010.vtm    reference and candidates (muscle, fibres, interior of the reference), bones, attachments
 """
 
@@ -44,7 +44,7 @@ _BARS = {"error_bar": "max", "error_bar_of_surface": "hausdorff"}
 
 
 def write(comparison: Comparison, folder: Path) -> list[str]:
-    """Write the runs of a muscle into ``folder``, whole or not at all; the names of its files. InputError where it is not free."""
+    """Write the runs of a muscle into ``folder``, completely or not at all; the names of its files. InputError if not free."""
     case = casefile.muscle(comparison.scene)
     with new_folder(folder) as part:
         frames = _Frames(comparison)
@@ -89,7 +89,9 @@ class _Frames:
             yield "distance_to_bones", gaps
         if run is self.reference:
             pressed = contact.among(self.case.effects) is not None and in_situ.among(self.case.effects) is None
-            if gaps is not None and pressed:  # in situ it depends on gaps at rest, which only the solver knows
+            if (
+                gaps is not None and pressed
+            ):  # in situ the pressure depends on gaps at rest, which only the solver knows
                 yield "contact_pressure", self._contact_pressure()
             return
         yield "distance_to_reference", local_fields.to_same_vertex(run, self.reference)
@@ -101,7 +103,7 @@ class _Frames:
                 yield name, np.repeat(bar.values[:, None], len(run.surface.points), axis=1)
 
     def _contact_pressure(self) -> Floats:
-        """The sum over the bones (f, n) [MPa] of the law of contact at the vertices; 0 where these are not free."""
+        """The sum over the bones (f, n) [MPa] of the law of contact at the vertices; 0 if these are not free."""
         effect = contact.among(self.case.effects)
         assert effect is not None  # the caller checked it
         law, run = ContactLaw("free", effect.stiffness, effect.smoothing), self.reference
@@ -153,7 +155,9 @@ class _Frames:
 
 
 def interior(made: Results, frame: float) -> DataBlock:
-    """The tetrahedra of a reference; results that jump between them are at their middles, the least det F at their corners."""
+    """The tetrahedra of a reference; results that jump between tetrahedra are given at their middles, the least det F at their
+    corners.
+    """
     mesh, count = made.mesh, len(made.mesh.tets)
     cells = made.evaluate_in(np.arange(count), np.full((count, 4), 0.25), frame, _names(made, frame))
     middles = mesh.points[mesh.tets].mean(axis=1)
@@ -166,12 +170,12 @@ def interior(made: Results, frame: float) -> DataBlock:
 
 
 def _names(made: Results, frame: float) -> list[str]:
-    """The arrays of a frame that are written, beside displacement."""
+    """The arrays of a frame that are written, in addition to displacement."""
     return [name for name in made.names(made.states[frame]) if name in _EVALUATED]
 
 
 def _states(comparison: Comparison) -> Results | None:
-    """The results of the reference, None where it keeps no states."""
+    """The results of the reference, None if it keeps no states."""
     run = comparison.reference
     folder = run.folder
     if folder is None or not states.are_kept(folder, run.numbers):

@@ -33,4 +33,4 @@ def _shown(value: object) -> str:
 
 
 class MissingSoftware(Exception):  # noqa: N818 - it is a state of the machine, not a mistake of the caller
-    """A package or program that is needed is not installed; the message states how to get it."""
+    """A required package or program is not installed; the message states how to get it."""

@@ -25,7 +25,7 @@ _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 
 def _checked(value: object) -> str:
-    """The text of a formula; ValueError where ``value`` is not a formula."""
+    """The text of a formula; ValueError if ``value`` is not a formula."""
     if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max:
         return repr(float(value))
     if not isinstance(value, str) or len(value) > _LONGEST:

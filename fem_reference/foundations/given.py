@@ -14,7 +14,7 @@ def said(value: object) -> str:
 
 
 def path(given: Any, place: str) -> Path:
-    """The ``given`` path, whether it exists or not; InputError where it cannot be a path."""
+    """The ``given`` path, whether it exists or not; InputError if it cannot be a path."""
     if not isinstance(given, str | Path) or not str(given):
         raise InputError(place, said(given), "a path")
     try:

@@ -1,8 +1,8 @@
 """Indicators of the effects that a case needs, estimated before anything is solved.
 
 Hierarchical modelling chooses the parts of a model by an indicator of the modelling error (Oden and Prudhomme 2002,
-doi 10.1006/jcph.2002.7183). Here the indicators are the displacement [mm] and the stress [MPa] by an effect, estimated from rest
-geometry, motion and parameters, and compared with the accuracy. An isometric contraction causes stress and no displacement.
+doi 10.1006/jcph.2002.7183). Here the indicators are the displacement [mm] and the stress [MPa] due to an effect, estimated from
+rest geometry, motion and parameters, and compared with the accuracy. An isometric contraction causes stress and no displacement.
 """
 
 from collections.abc import Mapping
@@ -12,8 +12,8 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Indicator:
-    """Indicator of an effect: an ``estimate`` [mm] of the displacement of the surface that it causes, root mean square at the worst
-    frame; the greatest ``stress`` [MPa] there; and the ``number`` from which both follow, with the ``rule`` that gives it.
+    """Indicator of an effect. ``estimate`` [mm]: the displacement of the surface due to the effect, root mean square at the worst
+    frame. ``stress`` [MPa]: the greatest stress due to it. ``number``: the value from which both follow, computed by the ``rule``.
     """
 
     rule: str
@@ -24,9 +24,9 @@ class Indicator:
 
 @dataclass(frozen=True)
 class Near:
-    """Nearness of the free surface to a bone: the guaranteed clearance ``gap`` [mm], whatever the error of the guessed surface
-    motion; the possible penetration ``depth`` [mm], root mean square over the surface at the worst frame; and the first ``frame``
-    with the smallest gap.
+    """Nearness of the free surface to a bone. ``gap`` [mm]: the clearance, guaranteed for any error of the guessed surface motion.
+    ``depth`` [mm]: the possible penetration, root mean square over the surface at the worst frame. ``frame``: the first frame with
+    the smallest gap.
     """
 
     gap: float
@@ -38,14 +38,14 @@ class Near:
 class Estimates:
     """Estimates of a case before it is solved. Lengths in mm, times in s, moduli in MPa, densities in tonne/mm^3.
 
-    ``length`` and ``thickness`` of the muscle, its ``shear`` modulus at rest, and the ``tension`` [MPa] of its fibres at rest
-    length, the mean over the frames; ``fixed``: the number of bones that it is attached to; ``sag``: the distance of its axis from
-    the straight line between two of them; ``lean``: the inclination of fibres to that line, from 0 to 1; ``travel``: the greatest
-    displacement of its surface by the motion of the bones; ``stretch``: the smallest and the greatest stretch of the line between
-    the attachments, taken for that of the fibres; ``interval``: the time between frame numbers, None where the case does not state
-    it; the greatest ``speed``, speed ``sideways`` of that line, ``jump`` of velocity at an instant, and ``acceleration``, per frame
-    number; ``frames``: all frame numbers, and knots of ramps; ``tolerance`` [mm] and ``stress_tolerance`` [MPa]: an effect that
-    changes less is not needed; ``near``: the nearness to each bone.
+    ``length``, ``thickness``: size of the muscle. ``shear``: its shear modulus at rest. ``tension`` [MPa]: tension of its fibres at
+    rest length, the mean over the frames. ``fixed``: the number of bones to which it is attached. ``sag``: the distance of its axis
+    from the straight line between two of these bones. ``lean``: the inclination of fibres to this line, from 0 to 1. ``travel``:
+    the greatest displacement of the surface due to the bones. ``stretch``: the least and the greatest stretch of the line between
+    the attachments, used as stretch of the fibres. ``interval``: the time between frame numbers, None if not stated. ``speed``,
+    ``sideways``, ``jump``, ``acceleration``: the greatest speed, sideways speed of the line, sudden change of velocity, and
+    acceleration, per frame number. ``frames``: all frame numbers, and knots of ramps. ``tolerance`` [mm], ``stress_tolerance``
+    [MPa]: an effect that changes less is not needed. ``near``: the nearness to each bone.
     """
 
     length: float
@@ -69,8 +69,8 @@ class Estimates:
 
     def bend(self, force: float) -> float:
         """Displacement [mm], root mean square, of a Timoshenko beam with clamped ends under a ``force`` per volume [N/mm3]. Its
-        length, thickness and shear modulus are those of the muscle, its Young's modulus three times the last. The mean is 0.6 of
-        the displacement in the middle, halved because bending also stretches. For a free body, it is its own length.
+        length, thickness and shear modulus are those of the muscle; its Young's modulus is three times its shear modulus. The mean
+        is 0.6 of the displacement in the middle, halved because bending also stretches. A free body is displaced by its length.
         """
         if not self.fixed:
             return self.length
@@ -79,7 +79,7 @@ class Estimates:
         return float(0.3 * middle) / (1 + self.taut(self.tension))
 
     def taut(self, pull: float) -> float:
-        """Stiffness that such a beam gains from the ``pull`` [MPa] of its fibres, relative to its own."""
+        """Stiffness that such a beam gains from the ``pull`` [MPa] of its fibres, relative to its bending stiffness."""
         return pull / self.shear * (self.length / self.thickness) ** 2 / 12
 
     def draw(self, force: float) -> float:
@@ -96,7 +96,8 @@ class Estimates:
 
     def straighten(self, pull: float) -> float:
         """Displacement [mm] of the surface, root mean square, by the ``pull`` [MPa] of fibres in a beam with clamped ends: at most
-        0.6 of the beam's sag, against its bending stiffness; inclined fibres also shear it. Without two clamped ends it shortens.
+        0.6 of the beam's sag, against its bending stiffness; inclined fibres also shear the beam. Without two clamped ends the beam
+        shortens.
         """
         if self.fixed < 2:
             return self.shorten(pull, 0.3)
@@ -107,5 +108,5 @@ class Estimates:
         return share * self.length * pull / (pull + 3 * self.shear)
 
     def in_time(self, rate: float) -> float:
-        """A ``rate`` per frame number, converted to one per second; 0 where the frame interval is not known."""
+        """A ``rate`` per frame number, converted to a rate per second; 0 if the frame interval is not known."""
         return rate / self.interval if self.interval else 0.0

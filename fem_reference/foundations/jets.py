@@ -12,11 +12,9 @@ from fem_reference.foundations.mesh import Floats
 
 @dataclass(frozen=True, eq=False)
 class Jet:
-    """``value`` (...,), ``slope`` (n, ...) and ``curvature`` (n, n, ...) with respect to n variables, over points (...,); the
-    curvature is None where it is not needed, which saves nine tenths of the work.
-
-    A slope or curvature that is the same at all points has length 1 along their axes. An array combined with a jet has as many axes
-    as the points of the jet, or none.
+    """``value`` (...,), ``slope`` (n, ...) and ``curvature`` (n, n, ...) with respect to n variables, over points (...,). The
+    curvature is None if it is not needed, which saves nine tenths of the work. A slope or curvature that is the same at all points
+    has length 1 along the axes of the points. An array combined with a jet has as many axes as the points of the jet, or none.
     """
 
     value: Any
@@ -95,7 +93,7 @@ def _differentiated(function: Callable[[Any], tuple[Any, Any, Any]]) -> Callable
 
 
 def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
-    """``then`` where ``x > limit``, else ``otherwise``; the derivatives are those of the branch."""
+    """``then`` where ``x > limit``, else ``otherwise``; the derivatives are taken from the same branch."""
     chosen = getattr(x, "value", x) > getattr(limit, "value", limit)
     like = next((branch for branch in (then, otherwise) if isinstance(branch, Jet)), None)
     if like is None:

@@ -1,4 +1,4 @@
-"""Ranges of deformation in which a law is valid and of parameters in the literature, and the tolerance of the energy balance."""
+"""Ranges of deformation in which a law is valid, of parameters in the literature, and the tolerance of the energy balance."""
 
 from dataclasses import dataclass
 from math import inf
@@ -10,13 +10,13 @@ from fem_reference.foundations.records import Record
 # computed again with a state halfway; if a difference remains, the run is doubtful.
 ENERGY_GAP = 0.05
 
-# V/V0 is det F; the fibre stretch is that of the energies, isochoric and with the prestretch.
+# V/V0 is det F; the fibre stretch is the stretch in the energies, isochoric and with the prestretch.
 Measure = Literal["V/V0", "fibre stretch"]
 
 
 @dataclass(frozen=True)
 class Limit:
-    """The states for which a law is meant: their ``measure`` lies between ``low`` and ``high``, both without unit."""
+    """The states in which a law is valid: their ``measure`` is between ``low`` and ``high``, both without unit."""
 
     measure: Measure
     low: float = 0.0
@@ -25,7 +25,7 @@ class Limit:
 
 class Range(Record):
     """The range of a parameter in the literature, from ``low`` to ``high`` as scene files write them, and its ``source``. All
-    values in it count as equally likely (``spread`` ``"uniform"``), or all their logarithms (``"log-uniform"``).
+    values in the range are equally likely (``spread`` ``"uniform"``), or all their logarithms (``"log-uniform"``).
     """
 
     low: str | float

@@ -1,4 +1,4 @@
-"""Loads on a body: their amounts over time, their force and moment, and the integrals of its shape that give these."""
+"""Loads on a body: their amounts over time, their force and moment, and the integrals of the body's shape for these."""
 
 from typing import NamedTuple, Protocol
 
@@ -32,7 +32,7 @@ class Shape(Protocol):
 
     def measure(self, on: str | None = None) -> tuple[float, Floats]:
         """The volume [mm3] at rest, or the area [mm2] of a region ``on``, and the integral (3,) of the present positions over it;
-        NaN where these are unknown.
+        NaN if these are unknown.
         """
 
     def facing(self, on: str) -> tuple[Floats, Floats] | None:

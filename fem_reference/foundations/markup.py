@@ -24,7 +24,7 @@ def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) ->
 
 
 def exact(value: object) -> str:
-    """A value as text with all the digits it has.
+    """A value as text with all its digits.
 
     >>> exact(0.123456), exact(True), exact("0.11.0"), exact(None), exact((0.0, -9810.0))
     ('0.123456', 'yes', '0.11.0', 'not set', '(0, -9810)')

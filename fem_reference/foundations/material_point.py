@@ -45,11 +45,11 @@ class State:
     """The state at a point that an expression depends on; each entry is a number, an array over points or a symbolic expression.
 
     ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``; ``displacement``: (3,) [mm]; ``pressure``: the mixed pressure
-    unknown [MPa], None where no effect adds it; ``fibre``: the unit vector (3,) along the fibres at rest, None where there are
-    none; ``amount``: the factor of the effect (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] at the start of
-    the load step, ``F_before`` its deformation gradient, ``predicted`` (3,) [mm] the displacement at constant velocity,
-    ``rate`` [1/s] 1 over the duration of the step, 0 in a quasi-static one; ``regions``: the share of the point, from 0 to 1, in
-    each region of the body.
+    unknown [MPa], None if no effect adds it; ``fibre``: the unit vector (3,) along the fibres at rest, None without fibres;
+    ``amount``: the factor of the effect (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] at the start of the
+    load step; ``F_before``: its deformation gradient; ``predicted``: the displacement (3,) [mm] at constant velocity; ``rate``: 1
+    over the duration of the step [1/s], 0 in a quasi-static step; ``regions``: the share of the point, from 0 to 1, in each region
+    of the body.
     """
 
     F: Sequence[Sequence[Any]]
@@ -120,7 +120,7 @@ class State:
         ]
 
     def between(self, low: Any, high: Any, x: Any) -> Any:
-        """``x``, or the nearer bound where x lies outside the bounds."""
+        """``x``, or the nearer bound if x is outside the bounds."""
         above = self.functions.above
         return above(x, high, high, above(x, low, x, low))
 

@@ -96,7 +96,7 @@ def normals(corners: Floats) -> Floats:
 
 
 def unit_normals(corners: Floats) -> Floats:
-    """Unit normals (m, 3) of triangles with ``corners`` (m, 3, 3); zero where they have no area."""
+    """Unit normals (m, 3) of triangles with ``corners`` (m, 3, 3); zero if they have no area."""
     found = normals(corners)
     lengths = np.linalg.norm(found, axis=1, keepdims=True)
     return np.asarray(np.divide(found, lengths, out=np.zeros_like(found), where=lengths > 0))
@@ -131,7 +131,7 @@ def tet_qualities(points: Floats, tets: Ints) -> Floats:
 
 
 def boundary(tets: Ints) -> tuple[Ints, Ints]:
-    """The triangles (m, 3) that belong to one of the ``tets`` (k, 4) only, outward, and the tet (m,) that each belongs to."""
+    """The triangles (m, 3) that belong to only one of the ``tets`` (k, 4), outward, and this tet (m,) for each."""
     faces = tets[:, TET_FACES].reshape(-1, 3)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     alone = np.sort(first[count == 1])
@@ -139,7 +139,7 @@ def boundary(tets: Ints) -> tuple[Ints, Ints]:
 
 
 def check_finite(surface: Surface) -> None:
-    """InputError where there are no triangles, a point is not finite, or a triangle has a vertex that does not exist."""
+    """InputError if there are no triangles, a point is not finite, or a triangle has a vertex that does not exist."""
     if len(surface.triangles) == 0:
         raise InputError(surface.place, "no triangles", "a triangle surface")
     bad = np.flatnonzero(~np.isfinite(surface.points).all(axis=1))
@@ -153,7 +153,7 @@ def check_finite(surface: Surface) -> None:
 
 
 def check_corners(surface: Surface) -> None:
-    """InputError where a triangle has a vertex that does not exist."""
+    """InputError if a triangle has a vertex that does not exist."""
     if surface.triangles.min(initial=0) < 0 or surface.triangles.max(initial=-1) >= len(surface.points):
         want = f"0 to {len(surface.points) - 1}"
         raise InputError(surface.place, "a triangle with a vertex that does not exist", want)
@@ -162,7 +162,7 @@ def check_corners(surface: Surface) -> None:
 def check_closed(surface: Surface) -> Surface:
     """The surface, outward, if it bounds one body: finite, closed, manifold and consistently oriented, with every point used.
 
-    InputError otherwise, with the number of wrong edges, vertices or parts, and the place of the first or smallest of them.
+    InputError otherwise, with the number of wrong edges, vertices or parts, and the place of the first or the smallest.
     """
     check_finite(surface)
     points, triangles = surface.points, surface.triangles
@@ -202,13 +202,13 @@ def corner_fans(one: Ints, other: Ints, count: int) -> Ints:
 
 
 def connected_parts(first: Ints, second: Ints, count: int) -> Ints:
-    """The number (count,) of the connected part of each of ``count`` things, where ``first`` (e,) are linked to ``second``."""
+    """The number (count,) of the connected part of each of ``count`` things; ``first`` (e,) are linked to ``second`` (e,)."""
     links = coo_array((np.ones(len(first), bool), (first, second)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
 
 
 def _check_parts(surface: Surface) -> None:
-    """InputError where a closed oriented surface has a vertex with several fans of triangles, or several connected parts."""
+    """InputError if a closed oriented surface has a vertex with several fans of triangles, or several connected parts."""
     one, other = twins(surface.triangles).T
     corners = surface.triangles.ravel()
     _, corner = np.unique(corner_fans(one, other, len(corners)), return_index=True)

@@ -1,4 +1,4 @@
-"""The modules in folders, one file or folder each, which are what a package offers."""
+"""The modules in folders, one file or folder each, that a package offers."""
 
 import pkgutil
 from collections.abc import Iterable

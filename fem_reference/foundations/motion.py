@@ -49,7 +49,7 @@ class RigidMotion:
         return np.asarray(self.axis, float) / np.linalg.norm(self.axis)
 
     def turning(self, points: Floats) -> Turning:  # noqa: ARG002
-        """The keyframes and the angles [rad] there, all 0 where the bone slides."""
+        """The keyframes and their angles [rad], all 0 if the bone slides."""
         return self.frames, self.amounts if self.centre is not None else (0.0,) * len(self.frames)
 
 

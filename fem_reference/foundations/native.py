@@ -38,5 +38,5 @@ def library(source: Path, flags: Sequence[str], folder: Path) -> CDLL:
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             if done.returncode:
                 raise RuntimeError(f"{command[0]} cannot compile {source}: {done.stderr.strip()}")
-            made.replace(kept)  # atomic, also where several processes compile it
+            made.replace(kept)  # atomic, even if several processes compile the file
     return CDLL(str(kept))

@@ -32,6 +32,6 @@ def only_record(module: ModuleType, places: tuple[str, ...], kinds: tuple[type[R
 
 
 def source(module: ModuleType) -> bytes:
-    """The content of the file of a ``module`` outside the package; empty for one inside, whose code is hashed elsewhere."""
+    """The content of the file of a ``module`` outside the package; empty for a module inside, whose code is hashed elsewhere."""
     file = Path(str(module.__file__)).resolve()
     return b"" if file.is_relative_to(_PACKAGE) else file.read_bytes()

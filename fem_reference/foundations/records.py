@@ -7,7 +7,8 @@ from difflib import get_close_matches
 from itertools import pairwise
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError, model_validator
+import pydantic
+from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from fem_reference.foundations.errors import InputError
 
@@ -23,16 +24,32 @@ class Record(BaseModel):
     )
 
 
-def one_of(*keys: str) -> Any:
-    """A check of a record: exactly one of its ``keys`` has a value."""
+def rule(holds: Callable[[Any], object], want: str) -> Any:
+    """A check of a record that is an error, with the text ``want``, unless it ``holds`` for the record."""
 
     def check(record: Any) -> Any:
-        if sum(getattr(record, key) is not None for key in keys) != 1:
-            named = (" and " if len(keys) == 2 else ", ").join(f'"{key}"' for key in keys)
-            raise ValueError(f"exactly one of {named}")
+        if not holds(record):
+            raise ValueError(want)
         return record
 
-    return model_validator(mode="after")(check)
+    return pydantic.model_validator(mode="after")(check)
+
+
+def key_rule(key: str, holds: Callable[[Any, dict[str, Any]], object], want: str) -> Any:
+    """A check of a ``key`` of a record, as :func:`rule`; ``holds`` gets its value, and those of the keys before it by name."""
+
+    def check(value: Any, info: Any) -> Any:
+        if not holds(value, info.data):
+            raise ValueError(want)
+        return value
+
+    return pydantic.field_validator(key)(check)
+
+
+def one_of(*keys: str) -> Any:
+    """A check of a record: exactly one of its ``keys`` has a value."""
+    named = (" and " if len(keys) == 2 else ", ").join(f'"{key}"' for key in keys)
+    return rule(lambda one: sum(getattr(one, key) is not None for key in keys) == 1, f"exactly one of {named}")
 
 
 def increasing(values: Sequence[float] | None, want: str) -> Any:
@@ -50,7 +67,7 @@ def directed(vector: tuple[float, float, float], name: str) -> tuple[float, floa
 
 
 def check_name(name: str) -> str:
-    """The ``name``; ValueError where it cannot be a name."""
+    """The ``name``; ValueError if it cannot be a name."""
     if not name.isprintable() or name != name.strip() or not 0 < len(name) <= _LONGEST_NAME:
         raise ValueError(f"a name of 1 to {_LONGEST_NAME} letters, digits and signs, without blanks at its ends")
     return name
@@ -63,14 +80,14 @@ def _check_file_name(name: str) -> str:
 
 
 def check_once(names: Sequence[str], place: str) -> None:
-    """Raise InputError where one of ``names`` occurs twice."""
+    """Raise InputError if one of ``names`` occurs twice."""
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise InputError(place, f'the name "{twice}" twice', "every name once")
 
 
 def check_used(known: Sequence[str], uses: Sequence[tuple[str, str]], place: str) -> None:
-    """Raise InputError where one of the ``uses``, (key, name) each, has a name that is not ``known``."""
+    """Raise InputError if one of the ``uses``, (key, name) each, has a name that is not ``known``."""
     for key, name in uses:
         if name not in known:
             want = f"one of {', '.join(known)}" if known else "none, as none is defined"
@@ -93,7 +110,7 @@ def parse[R](record: type[R], table: object, place: str) -> R:
     except RecursionError as error:
         raise InputError(place, "tables inside tables without end", "the keys of a file") from error
     except ValidationError as error:
-        # Unknown keys come first: a mistyped key explains more than the error that the intended key is missing.
+        # Unknown keys come first: naming a mistyped key helps more than reporting that the intended key is missing.
         wrong = sorted(_own(error.errors()), key=lambda one: one["type"] != "extra_forbidden")
         raise together([_as_input_error(one, record, place, table) for one in wrong]) from None
 
@@ -123,7 +140,7 @@ def _turned(value: Any, kind: type[Sequence[Any]], into: Callable[[Iterator[Any]
 
 
 def join(place: str, key: str) -> str:
-    """``place`` with ``key`` below it: after a colon if it is a file, after a dot if it is a key."""
+    """``place`` with ``key`` below it: after a colon if the place is a file, after a dot if it is a key."""
     return place if not key else f"{place}{': ' if place.endswith(('.toml', '.json')) else '.'}{key}"
 
 

@@ -38,7 +38,7 @@ def environment(**settings: str) -> dict[str, str]:
 
 
 def end_with_starter() -> None:
-    """End this process a second or two after the one that started it, directly or not, even if the latter is killed."""
+    """End this process a second or two after the process that started it, directly or not, even if that process is killed."""
     starter = os.environ.get(_STARTER)
     if starter is not None:
         threading.Thread(target=_watch, args=(int(starter),), daemon=True).start()
@@ -57,7 +57,7 @@ def lives(process: int) -> bool:
         return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
     except ProcessLookupError:
         return False
-    except (OSError, IndexError):  # it belongs to another user, or there is no /proc
+    except (OSError, IndexError):  # the process belongs to another user, or there is no /proc
         return True
 
 
@@ -69,7 +69,7 @@ def forget_peak_memory() -> None:
 
 def processor_times(process: int, *, of_ended: bool = False) -> dict[int, float]:
     """Processor times [s] by process number, of a ``process`` and its running descendants; with ``of_ended``, each includes the
-    times of ended subprocesses for which it has waited. Empty where the system does not report them.
+    times of ended subprocesses for which it has waited. Empty if the system does not report them.
     """
     parents, times = dict[int, int](), dict[int, float]()
     for folder in Path("/proc").glob("[0-9]*"):
@@ -86,8 +86,8 @@ def processor_times(process: int, *, of_ended: bool = False) -> dict[int, float]
 
 
 class MachineTime(NamedTuple):
-    """A moment: the time by the clock [s], the processor time [s] of this process and its descendants, and that of all processes of
-    the machine, NaN where the system does not report it.
+    """A moment: the time by the clock [s], the processor time [s] of this process and its descendants, and the processor time of
+    all processes on the machine, NaN if the system does not report it.
     """
 
     seconds: float
@@ -106,7 +106,7 @@ class MachineTime(NamedTuple):
         return cls(time.perf_counter(), sum(processor_times(os.getpid(), of_ended=True).values()), busy)
 
     def load(self) -> float | None:
-        """The share of the machine that other processes have used since then, None where the system does not report it."""
+        """The share of the machine that other processes have used since then, None if the system does not report it."""
         now = MachineTime.now()
         capacity = (now.seconds - self.seconds) * (os.cpu_count() or 1)
         share = (now.all - self.all - (now.ours - self.ours)) / capacity if capacity > 0 else math.nan
@@ -121,7 +121,7 @@ def spent_since(before: MachineTime) -> dict[str, str]:
 
 
 def peak_memory(process: int | None = None) -> float:
-    """The peak memory [MB] since :func:`forget_peak_memory` or the start; of another ``process``, 0 where it is not reported."""
+    """The peak memory [MB] since :func:`forget_peak_memory` or the start; of another ``process``, 0 if it is not reported."""
     with suppress(OSError, StopIteration):
         lines = Path(f"/proc/{process or 'self'}/status").read_text(encoding="utf-8").splitlines()
         return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
@@ -137,7 +137,7 @@ def scratch_folder() -> Iterator[Path]:
 
 
 def _clear(root: Path) -> None:
-    """Remove folders that killed processes left; those that it may not remove stay."""
+    """Remove folders that killed processes left; folders without permission to remove stay."""
     for path in root.glob(f"{_PREFIX}*"):
         with suppress(OSError, Timeout):
             if time.time() - path.stat().st_mtime > _SETTLED and (path / _LOCK).is_file():

@@ -1,6 +1,6 @@
 """Text with a unit -> a number in mm, N, MPa, s, rad, tonne: the only module in which a unit is text.
 
-The annotated types are what scene records are made of: a field of type ``Pressure`` takes ``"30 kPa"`` and stores 0.03.
+Scene records consist of the annotated types: a field of type ``Pressure`` takes ``"30 kPa"`` and stores 0.03.
 """
 
 import math
@@ -12,14 +12,14 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator
 
-# The units [mm] that the coordinates of a file may be in, in scenes, beside frames and on the command line. Quantities with a
-# number may have any unit of their kind; here a slip such as "Mm", 1e9 mm, would go unnoticed.
+# The allowed units [mm] of coordinates in a file: in scenes, beside frames and on the command line. Quantities with a number may
+# have any unit of their kind; for coordinates a slip such as "Mm", 1e9 mm, would not be noticed.
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft": 304.8}
 
 
 class Kind(NamedTuple):
-    """A kind of quantity: its internal ``unit``, ``examples`` of one and of three in a file, the ``greatest`` accepted magnitude,
-    which is above any real one and loses no digits; and for a kind without a unit, the texts that are accepted in place of one.
+    """A kind of quantity: its internal ``unit``, ``examples`` of one and of three values in a file, and the ``greatest`` accepted
+    magnitude, above any real value and without loss of digits. For a kind without a unit: the texts accepted instead of a unit.
     """
 
     unit: str
@@ -86,7 +86,7 @@ _EXPONENT = re.compile(r"(?<=[A-Za-z])(?=[23](?!\w))")
 
 @cache
 def _registry() -> Any:
-    import pint  # here, as it takes 0.4 s, which processes that read only common units save
+    import pint  # imported here, as it takes 0.4 s, which processes with common units only save
 
     return pint.UnitRegistry(cache_folder=None)
 
@@ -118,7 +118,7 @@ def quantity(text: object, kind: str) -> float:
 
 @cache
 def _factor(unit: str, inside: str) -> float:
-    """The number of units ``inside`` in one ``unit``; an error of pint, or NaN, where the two are of different kinds."""
+    """The number of units ``inside`` in one ``unit``; an error of pint, or NaN, if the two are of different kinds."""
     if unit == inside or (unit, inside) in COMMON:
         return COMMON.get((unit, inside), 1.0)
     one = _registry().Quantity(1.0, _registry().parse_units(unit))
@@ -129,7 +129,7 @@ def _factor(unit: str, inside: str) -> float:
 
 
 def _split(text: object) -> tuple[str, str]:
-    """Number and unit as text; both empty where ``text`` does not begin with a number."""
+    """Number and unit as text; both empty if ``text`` does not begin with a number."""
     match = _NUMBER_AND_UNIT.fullmatch(text) if isinstance(text, str) and len(text) <= _LONGEST else None
     return (match[1], match[2]) if match else ("", "")
 
@@ -188,7 +188,7 @@ LengthUnit = Annotated[float, BeforeValidator(length_unit)]
 
 
 def unit_of(metadata: Sequence[object]) -> str:
-    """The internal unit of a field with the ``metadata`` of a type of this module; empty where it has none.
+    """The internal unit of a field with the ``metadata`` of a type of this module; empty if it has none.
 
     >>> unit_of(Density.__metadata__), unit_of(())
     ('tonne/mm^3', '')
@@ -198,7 +198,7 @@ def unit_of(metadata: Sequence[object]) -> str:
 
 
 def field_unit(field: Any) -> str:
-    """The internal unit of a ``field`` of a record, by its type or one of its types; empty where it has none."""
+    """The internal unit of a ``field`` of a record, by its type or one of its types; empty if it has none."""
     inside = (unit_of(getattr(kind, "__metadata__", ())) for kind in kinds(field.annotation))
     return unit_of(field.metadata) or next((unit for unit in inside if unit), "")
 

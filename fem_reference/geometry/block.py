@@ -19,7 +19,7 @@ _SAME = 1e-6  # tolerance relative to the largest edge: the precision of single-
 def fill(surface: Surface, size: float) -> TetMesh:
     """The axis-aligned box with the closed outward ``surface``, as a grid of boxes with edges of about ``size`` [mm].
 
-    InputError where it is not the surface of such a box, or where ``size`` is far too small or too large.
+    InputError if it is not the surface of such a box, or where ``size`` is far too small or too large.
     """
     low, high = _extent(surface)
     check_size(surface, size)
@@ -61,7 +61,7 @@ def _sheet(counts: Counts, axis: int, end: int) -> Ints:
 
 
 def _extent(surface: Surface) -> tuple[Floats, Floats]:
-    """The lowest and the highest corner (3,) of an axis-aligned box with this ``surface``; InputError where it is not a box."""
+    """The lowest and the highest corner (3,) of an axis-aligned box with this ``surface``; InputError if it is not a box."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     near = _SAME * float((high - low).max())
     corners = surface.points[surface.triangles]

@@ -136,7 +136,7 @@ def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
 
 
 def _flip_gain(points: Floats, edges: Edges) -> Floats:
-    """The excess (e,) [rad] over pi of the sum of the angles opposite to each edge; 0 where a flip is useless or would bend."""
+    """The excess (e,) [rad] over pi of the sum of the angles opposite to each edge; 0 if a flip is useless or would bend."""
     a, b, c, d = (points[corner] for corner in (*edges.ends.T, *edges.opposite.T))
     excess = _angle(a - c, b - c) + _angle(a - d, b - d) - np.pi
     before = _cosine(np.cross(b - a, c - a), np.cross(a - b, d - b))

@@ -29,7 +29,7 @@ class Distances(NamedTuple):
 
 
 def distances(points: Floats, surface: Surface) -> Distances:
-    """The closest point of ``surface`` for each of ``points`` (n, 3) [mm]; ValueError where one is not finite."""
+    """The closest point of ``surface`` for each of ``points`` (n, 3) [mm]; ValueError if one is not finite."""
     points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
     for what, given in (("points", points), ("points of the surface", surface.points)):
         if not np.isfinite(given).all():  # libigl would give triangles that do not exist
@@ -94,7 +94,7 @@ def flattened(surface: Surface, place: Floats) -> float:
 @np.errstate(over="ignore", invalid="ignore")
 def outer_windings(surface: Surface) -> Floats:
     """The winding number (m,) of the surface at a point just outside each triangle: 0 on the skin of a valid body, positive inside
-    another part of the body, negative where the triangle faces a part that is inside out; NaN where a triangle has no normal.
+    another part of the body, negative where the triangle faces a part that is inside out; NaN if a triangle has no normal.
 
     "Just outside" is 1e-5 of the surface's diagonal away; thinner folds are not distinguished. Winding numbers by Barill et al.
     2018, doi 10.1145/3197517.3201337, differ by a few thousandths from the whole numbers to which they are rounded.

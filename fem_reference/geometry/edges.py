@@ -36,7 +36,7 @@ class Edges:
     def angles(self, points: Floats) -> Floats:
         """Angle (e,) [rad] from the normal of the left triangle to that of the right, in (-pi, pi].
 
-        0 where the two are flat, pi / 2 at the edges of a box, below 0 where the surface is hollow; NaN where a triangle
+        0 where the two are flat, pi / 2 at the edges of a box, below 0 where the surface is hollow; NaN if a triangle
         has no normal. It is atan2((n x m) . d, n . m) of the unit normals n, m and the direction d of the edge:
         report eq. 5.23 without its arccos, which loses the sign and, for small angles, the digits.
         """

@@ -60,7 +60,7 @@ class Exemption:
         return cls(surface, corners[np.concatenate([np.zeros(0, np.int64), *some])], by, names, spacing(surface))
 
     def away(self, triangles: Ints, points: Floats) -> tuple[Floats, Ints]:
-        """Distances (k,) [mm] of ``points`` (k, 3) of the ``triangles`` (k,) from the attached part, infinite where that part
+        """Distances (k,) [mm] of ``points`` (k, 3) of the ``triangles`` (k,) from the attached part, infinite if that part
         faces away, and the index (k,) of its attachment.
         """
         if len(self.part) == 0:
@@ -114,7 +114,7 @@ class Exemption:
 
     @cached_property
     def lost(self) -> float:
-        """The share of the unattached surface that is exempt from contact; 1 where all is attached."""
+        """The share of the unattached surface that is exempt from contact; 1 if all is attached."""
         areas = corner_areas(self._places)
         loose = areas.sum() - corner_areas(self.part).sum()
         return float(1 - areas[self.felt].sum() / loose) if loose > 0 else 1.0

@@ -1,6 +1,7 @@
 """Smooth obstacles of paths: quadrics (ellipsoids and cylinders) and tori, with level functions and their two derivatives."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -52,6 +53,17 @@ class Quadric:
         own = directions @ self.pose[:3, :3] / self.radii
         return np.asarray(2 * np.vecdot(own, own))
 
+    def curving(self, points: Floats, directions: Floats) -> Floats:
+        """The second derivatives (n, 3) by length of geodesics through ``points`` along ``directions`` (n, 3)."""
+        slope = (points - self.pose[:3, 3]) @ self._form
+        return np.asarray((-np.vecdot(directions @ self._form, directions) / np.vecdot(slope, slope))[:, None] * slope)
+
+    @cached_property
+    def _form(self) -> Floats:
+        """The matrix (3, 3) of half of the second derivatives."""
+        turn = self.pose[:3, :3] / self.radii
+        return np.asarray(turn @ turn.T)
+
     def pushed(self, points: Floats) -> Floats:
         """The ``points`` (n, 3), those inside moved to the surface along its normal; those deep inside first off the axis."""
         own, thin = self._own(points), int(np.argmin(self.radii))
@@ -102,11 +114,19 @@ class Ring:
 
     def bending(self, points: Floats, directions: Floats) -> Floats:
         """The second derivative (n,) at ``points`` (n, 3) along ``directions`` (n, 3)."""
+        return self._bending(directions, *self._outward(points))
+
+    def curving(self, points: Floats, directions: Floats) -> Floats:
+        """The second derivatives (n, 3) by length of geodesics through ``points`` along ``directions`` (n, 3)."""
         outward, away = self._outward(points)
-        axis = self.pose[:3, 2]
-        out, up = np.vecdot(directions, outward), directions @ axis
-        around = np.vecdot(directions, directions) - out**2 - up**2
-        return np.asarray(2 * (out**2 + up**2 + around * (1 - self.radius / away)))
+        slope = 2 * (points - self.pose[:3, 3] - self.radius * outward)
+        bending = self._bending(directions, outward, away)
+        return np.asarray((-bending / np.vecdot(slope, slope))[:, None] * slope)
+
+    def _bending(self, directions: Floats, outward: Floats, away: Floats) -> Floats:
+        squares = np.vecdot(directions, outward) ** 2 + (directions @ self.pose[:3, 2]) ** 2
+        around = np.vecdot(directions, directions) - squares
+        return np.asarray(2 * (squares + around * (1 - self.radius / away)))
 
     def pushed(self, points: Floats) -> Floats:
         """The ``points`` (n, 3), those inside moved to the surface, away from the circle."""
@@ -131,7 +151,7 @@ class Ring:
         """Unit vectors (n, 3) and distances (n,) from the axis; for a point on the axis along the first axis of the pose."""
         arm = points - self.pose[:3, 3]
         flat = arm - (arm @ self.pose[:3, 2])[:, None] * self.pose[:3, 2]
-        away = np.linalg.norm(flat, axis=1)
+        away = np.sqrt(np.vecdot(flat, flat))
         flat[away < _MIDDLE * self.radius] = _MIDDLE * self.radius * self.pose[:3, 0]
         away = np.maximum(away, _MIDDLE * self.radius)
         return flat / away[:, None], away

@@ -21,7 +21,7 @@ _FLAT = np.repeat([0, 1 / 3], 3)
 @dataclass(frozen=True, eq=False)
 class Displaced:
     """A ``mesh``, straight at rest, whose nodes are displaced ``by`` (k, 10, 3) [mm] and have a ``velocity`` (k, 10, 3) [mm/s]:
-    corners of each tet, then the middles of its ``EDGES``; None where these are unknown. A
+    corners of each tet, then the middles of its ``EDGES``; None if these are unknown. A
     :class:`fem_reference.foundations.loads.Shape`.
     """
 
@@ -31,7 +31,7 @@ class Displaced:
 
     @cached_property
     def nodes(self) -> Floats:
-        """The present positions (k, 10, 3) [mm] of the nodes; NaN where they are unknown."""
+        """The present positions (k, 10, 3) [mm] of the nodes; NaN if they are unknown."""
         corners = self.mesh.points[self.mesh.tets]
         middles = corners[:, EDGES].mean(axis=2)
         return np.asarray(np.concatenate([corners, middles], axis=1) + (np.nan if self.by is None else self.by))
@@ -39,7 +39,8 @@ class Displaced:
     def measure(self, on: str | None = None) -> tuple[float, Floats]:
         """The volume [mm3] at rest, or the area [mm2] of a region, and the integral (3,) of the present positions over it."""
         if on is None:
-            sizes, means = tet_volumes(self.mesh.points, self.mesh.tets), np.einsum("q,kqi->ki", _BULK, self.nodes)
+            sizes = np.abs(tet_volumes(self.mesh.points, self.mesh.tets))
+            means = np.einsum("q,kqi->ki", _BULK, self.nodes)
         else:
             tets, local = self._facets(on)
             sizes = corner_areas(self.mesh.points[np.take_along_axis(self.mesh.tets[tets], local[:, :3], axis=1)])
@@ -58,7 +59,7 @@ class Displaced:
         return areas.sum(axis=(0, 1)), np.cross(places, areas).sum(axis=(0, 1))
 
     def motion(self) -> tuple[Floats, Floats] | None:
-        """The integral of the velocity (3,) [mm4/s] over the volume at rest, and its moment (3,) [mm5/s]; None where unknown."""
+        """The integral of the velocity (3,) [mm4/s] over the volume at rest, and its moment (3,) [mm5/s]; None if unknown."""
         if self.by is None or self.velocity is None:
             return None
         sizes = tet_volumes(self.mesh.points, self.mesh.tets)

@@ -217,7 +217,7 @@ def _length(vectors: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _over(tensors: Floats, length: Floats) -> Floats:
-    """``tensors`` (n, d, d) divided by ``length`` (n,), zero where the length is zero."""
+    """``tensors`` (n, d, d) divided by ``length`` (n,), zero if the length is zero."""
     return np.asarray(tensors * np.divide(1, length, out=np.zeros_like(length), where=length != 0)[:, None, None])
 
 

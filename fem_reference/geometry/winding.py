@@ -251,19 +251,15 @@ def _better(pieces: _Pieces, change: Floats, before: Floats) -> tuple[_Pieces, F
 def _geodesic(obstacle: SmoothSurface, points: Floats, along: Floats, sizes: Floats) -> tuple[Floats, Floats]:
     """Points and unit tangents (steps + 1, n, 3) from ``points`` ``along`` (n, 3) by ``sizes`` (n,): Runge-Kutta's method."""
     step, path = (sizes / _STEPS)[:, None], [(points, along)]
-
-    def bent(place: Floats, direction: Floats) -> Floats:
-        slope = obstacle.level(place)[1]
-        share = obstacle.bending(place, direction) / np.vecdot(slope, slope)
-        return np.asarray(-share[:, None] * slope)
-
+    half, bent = step / 2, obstacle.curving
     for _ in range(_STEPS):
         x, t = path[-1]
         a = bent(x, t)
-        b = bent(x + step / 2 * t, t + step / 2 * a)
-        c = bent(x + step / 2 * t + step**2 / 4 * a, t + step / 2 * b)
-        d = bent(x + step * t + step**2 / 2 * b, t + step * c)
-        place, tangent = x + step * t + step**2 / 6 * (a + b + c), t + step / 6 * (a + 2 * b + 2 * c + d)
+        middle, end = x + half * t, x + step * t
+        b = bent(middle, t + half * a)
+        c = bent(middle + half**2 * a, t + half * b)
+        d = bent(end + step * half * b, t + step * c)
+        place, tangent = end + step**2 / 6 * (a + b + c), t + step / 6 * (a + 2 * (b + c) + d)
         value, slope = obstacle.level(place)
         path.append((place - (value / np.vecdot(slope, slope))[:, None] * slope, _tangent(tangent, slope)))
     return np.array([x for x, _ in path]), np.array([t for _, t in path])

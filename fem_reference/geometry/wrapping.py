@@ -154,7 +154,7 @@ def _perpendicular(normals: Floats, arms: Floats) -> Floats:
 
 
 def _clipped(path: Floats, length: Floats) -> Floats:
-    """``path`` as a share of ``length``, from 0 to 1; 0 where there is no length."""
+    """``path`` as a share of ``length``, from 0 to 1; 0 if there is no length."""
     return np.clip(path / np.where(length > 0, length, 1.0), 0.0, 1.0)
 
 

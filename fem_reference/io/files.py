@@ -1,6 +1,6 @@
 """Reading and writing of surfaces, polylines and tetrahedra in common mesh formats; files are written whole or not at all.
 
-A reader keeps the order, the number and, where the file has it, the double precision of the points.
+A reader keeps the order and the number of the points and, if the file has it, their double precision.
 """
 
 import csv
@@ -24,14 +24,14 @@ from fem_reference.io.formats.msh import read_mesh
 from fem_reference.io.texts import beside, check_size, is_file, parsed_xml
 
 # The most bytes of a mesh, a table or an index: a million triangles, more than our meshers and solvers can use. The values of a
-# text file take up to thirty times as much memory as the file.
+# text file need up to thirty times the memory of the file.
 MOST_BYTES = 2**26
-# The age [s] above which a half-written file is removed if its process does not run here; before, it may run on another machine.
+# The age [s] above which a half-written file is removed if its process does not run here; a newer one may have a process elsewhere.
 _SETTLED = 10.0
 
 
 def shares_points(place: str) -> bool:
-    """True where triangles read from ``place`` share points, in the order of the file; False where each has three of its own."""
+    """True if triangles read from ``place`` share points, in the order of the file; False if each has three of its own."""
     found = formats().get(Path(place).suffix.lower())
     return found is None or found.shares_points
 
@@ -47,7 +47,7 @@ def _format(path: Path, want: str, known: Collection[str]) -> Format:
 def read_surface(path: Path, unit: float) -> Surface:
     """The triangles of a file whose coordinates are in units of ``unit`` mm; ``place`` is the path.
 
-    An STL file has no shared points: its surface has three points for each triangle. InputError where the file cannot be read
+    An STL file has no shared points: its surface has three points for each triangle. InputError if the file cannot be read
     completely or has polygons other than triangles.
     """
     want = f"a triangle surface, whole, as {' '.join(formats())}"
@@ -57,8 +57,8 @@ def read_surface(path: Path, unit: float) -> Surface:
 
 
 def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) -> Surface:
-    """The boundary of those tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of the cells (gmsh's is
-    ``gmsh:physical``); coordinates are in units of ``unit`` mm. InputError where the file lacks the array or all of the labels.
+    """The boundary of the tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of the cells (for gmsh
+    ``gmsh:physical``); coordinates are in units of ``unit`` mm. InputError if the file lacks the array or all of the labels.
     """
     want = (
         f'tetrahedra with an array "{array}" of integers, some of them {", ".join(map(str, labels))}, as .vtu or .msh'
@@ -83,10 +83,9 @@ def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) 
 
 
 def read_polylines(path: Path, unit: float, *, moved: bool = False) -> Polylines:
-    """The lines of a VTK or VTP file in units of ``unit`` mm; cells that begin where another ends are joined to it.
-
-    InputError where it cannot be read completely. ``moved``: True for lines of a moved state; in a state at rest, a point that is
-    not finite or a line without length is an error too.
+    """The lines of a VTK or VTP file in units of ``unit`` mm; cells that begin at the end of another cell are joined to it.
+    InputError if the file cannot be read completely. ``moved``: True for lines of a moved state; in a state at rest, a point that
+    is not finite or a line without length is an error too.
     """
     want = f"polylines, whole, as {' or '.join(vtk.LINES)}"
     _format(path, want, vtk.LINES)
@@ -137,7 +136,7 @@ def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
     """The surface with its points at ``positions`` (n, 3) [mm]; in VTK's formats with point data ``displacement`` [mm], float64."""
     written = [suffix for suffix, one in formats().items() if one.write]
     write = _format(path, f"one of {' '.join(written)}", written).write
-    assert write is not None  # the suffix is one of those that are written
+    assert write is not None  # the suffix is one of the written formats
     with whole(path) as part:
         write(part, surface.moved_to(positions), positions - surface.points)
 
@@ -176,7 +175,7 @@ def write_pvd(path: Path, frames: Sequence[tuple[float, str]]) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write ``text`` in UTF-8; directly into ``path`` if that is a pipe or a device."""
+    """Write ``text`` in UTF-8; directly into ``path`` if this is a pipe or a device."""
     if path.exists() and not path.is_file():
         try:
             path.write_text(text, encoding="utf-8")
@@ -189,8 +188,8 @@ def write_text(path: Path, text: str) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """A file beside ``path`` to write to, which replaces it on success and is removed otherwise. An OSError names ``path`` and, if
-    the disk is full, the free space.
+    """A file beside ``path`` to write to, which replaces ``path`` on success and is removed otherwise. An OSError names ``path``
+    and, if the disk is full, the free space.
     """
     part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
     clear(path)
@@ -205,7 +204,7 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def make_folder(path: Path) -> None:
-    """Create the folder ``path`` and those above it where they do not exist; an OSError names ``path`` and the reason."""
+    """Create the folder ``path`` and its missing parent folders; an OSError names ``path`` and the reason."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -28,7 +28,7 @@ def arrays(soup: Soup) -> tuple[Floats, Ints]:
 
 
 def check_lengths(points: Floats, lines: list[list[int]]) -> None:
-    """ValueError where one of ``points`` (n, 3) is not finite or one of the ``lines`` between them has no length."""
+    """ValueError if one of ``points`` (n, 3) is not finite or one of the ``lines`` between them has no length."""
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
         raise ValueError(f"a point that is not finite (point {bad[0]})")
@@ -38,7 +38,7 @@ def check_lengths(points: Floats, lines: list[list[int]]) -> None:
 
 
 def joined(cells: list[list[int]]) -> list[list[int]]:
-    """Lines of point numbers, in which a cell that begins where exactly one other ends is joined to that."""
+    """Lines of point numbers; a cell that begins at the end of exactly one other cell is joined to it."""
     starts, ends = Counter(cell[0] for cell in cells), Counter(cell[-1] for cell in cells)
     shared = {point for point in starts if starts[point] == ends[point] == 1}
     after = {cell[0]: cell for cell in cells}
@@ -54,13 +54,13 @@ def joined(cells: list[list[int]]) -> list[list[int]]:
 
 
 def only_triangles(corners: set[int]) -> None:
-    """ValueError where a polygon has more or fewer corners than three."""
+    """ValueError if a polygon has more or fewer corners than three."""
     if other := corners - {3}:
         raise ValueError(f"a polygon of {min(other)} corners")
 
 
 def positions(rows: list[list[float]]) -> Any:
-    """Points (n, 3) from n ``rows``; ValueError where one has fewer coordinates."""
+    """Points (n, 3) from n ``rows``; ValueError if one has fewer coordinates."""
     if any(len(row) != 3 for row in rows):
         raise ValueError("a position of fewer than three coordinates")
     return np.array(rows)
@@ -98,7 +98,7 @@ class DataSet(NamedTuple):
 
 
 def checked_cells(sizes: Any, corners: Any, points: int) -> PointLists:
-    """Cells of ``sizes`` (m,) in ``corners``; ValueError where one has a negative size or a point that does not exist."""
+    """Cells of ``sizes`` (m,) in ``corners``; ValueError if one has a negative size or a point that does not exist."""
     sizes, corners = np.asarray(sizes, np.int64), np.asarray(corners, np.int64)
     if (sizes < 0).any() or (sizes > len(corners)).any() or sizes.sum() != len(corners):
         raise ValueError(f"cells that do not fit in their {len(corners)} corners")
@@ -109,13 +109,13 @@ def checked_cells(sizes: Any, corners: Any, points: int) -> PointLists:
 
 
 def whole_number(text: str, name: str) -> int:
-    """The number that a text states; ValueError with its ``name`` where the text is not 1 to 18 digits."""
+    """The number in a text; ValueError with its ``name`` if the text is not 1 to 18 digits."""
     if not re.fullmatch(r"\d{1,18}", text, re.ASCII):
         raise ValueError(f'{name} of "{text[:40]}"')
     return int(text)
 
 
 def check_number(values: Any, count: int, name: str) -> None:
-    """ValueError where there are not ``count`` values of this ``name``."""
+    """ValueError if there are not ``count`` values of this ``name``."""
     if len(values) != count:
         raise ValueError(f"{len(values)} {name} of {count}")

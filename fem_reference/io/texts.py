@@ -18,16 +18,16 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 
-# The most bytes of a file: a case file has some kB, a baseline 1.3 kB per frame. In memory it takes up to thirty times as much.
+# The most bytes of a file: a case file has some kB, a baseline 1.3 kB per frame. The contents need up to thirty times the memory.
 MOST_TOML = 2**21
 MOST_JSON = 2**25
 # The most levels of nested tables and lists; case files have up to 6.
 DEEPEST = 32
-# A mesh file defines no entities: they can multiply a text a billion times, or stand for other files.
+# A mesh file may not define entities: they can multiply a text a billion times, or include other files.
 _FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")
 # Parts of a TOML text that are not keys: strings of all four kinds, and comments.
 _NO_KEYS = re.compile(r'"""(?:\\.|[^\\])*?"""|\'\'\'.*?\'\'\'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*', re.DOTALL)
-# Reading a dotted key takes time that grows as the square of its number of parts.
+# The time to read a dotted key grows with the square of the number of its parts.
 _LONG_KEY = re.compile(rf"(?<![\w-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++){{{DEEPEST},}}")
 
 
@@ -55,25 +55,25 @@ def toml_text(text: str) -> str:
 
 
 def read_json(path: Path, want: str) -> Any:
-    """The value of a JSON file; InputError with ``want`` for any other file, and for one with NaN or Infinity."""
+    """The value of a JSON file; InputError with ``want`` for any other file, and for a file with NaN or Infinity."""
     return _parsed(partial(json.loads, parse_constant=_no_number), _text(path, MOST_JSON, want), path, want)
 
 
 def parsed_xml(path: Path) -> ElementTree.Element:
-    """The root of an XML file; ValueError where it defines entities."""
+    """The root of an XML file; ValueError if it defines entities."""
     text = path.read_bytes()
     check_no_entities(text)
     return ElementTree.fromstring(text)
 
 
 def check_no_entities(text: bytes) -> None:
-    """ValueError where an XML text has a document type."""
+    """ValueError if an XML text has a document type."""
     if any(one in text for one in _FORBIDDEN):
         raise ValueError("a document type, which no mesh file needs")
 
 
 def beside(path: Path, name: str) -> Path:
-    """The file ``name`` to which the file at ``path`` refers; ValueError where it is outside its folder, after following links."""
+    """The file ``name`` to which the file at ``path`` refers; ValueError if it is outside its folder, after following links."""
     found = path.parent / name
     if not found.resolve().is_relative_to(path.parent.resolve()):
         raise ValueError(f'a reference to "{name}", outside the folder of the file')
@@ -81,7 +81,7 @@ def beside(path: Path, name: str) -> Path:
 
 
 def finite(value: float) -> float | None:
-    """``value`` for JSON: None where it is not finite.
+    """``value`` for JSON: None if it is not finite.
 
     >>> finite(2), finite(float("nan"))
     (2.0, None)
@@ -105,7 +105,7 @@ def plain(value: Any) -> Any:
 
 
 def is_file(path: Path) -> bool:
-    """True where the path is a file; False also where its name is too long for a file."""
+    """True if the path is a file; False also if its name is too long for a file."""
     try:
         return path.is_file()
     except OSError:
@@ -113,7 +113,7 @@ def is_file(path: Path) -> bool:
 
 
 def check_size(path: Path, most: int, want: str) -> None:
-    """InputError where a file has more than ``most`` bytes."""
+    """InputError if a file has more than ``most`` bytes."""
     if (size := path.stat().st_size) > most:
         raise InputError(path, f"a file of {size / 2**20:.0f} MB", f"{want}, of at most {most / 2**20:.0f} MB")
 
@@ -133,7 +133,7 @@ def _no_number(name: str) -> float:
 
 
 def _parsed(loads: Callable[[str], Any], text: str, place: object, want: str) -> Any:
-    """The value that ``loads`` reads from a text; InputError where it fails, or where the value is nested too deeply."""
+    """The value that ``loads`` reads from a text; InputError if it fails, or where the value is nested too deeply."""
     try:
         value = loads(text)
         level = [value]

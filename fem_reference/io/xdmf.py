@@ -28,7 +28,7 @@ def read(path: Path) -> list[tuple[float, Floats, Ints]]:
 
 
 def _displacement(data: dict[str, Any], points: Floats) -> Any:
-    """The displacement among point ``data`` of a step; ValueError without one of the shape of ``points``."""
+    """The displacement in the point ``data`` of a step; ValueError unless it has the shape of ``points``."""
     name = next((name for name in ("displacement", "u") if np.shape(data.get(name, 0)) == points.shape), None)
     if name is None:
         raise ValueError(f"point data {', '.join(data) or 'nothing'} in a step")
@@ -36,7 +36,7 @@ def _displacement(data: dict[str, Any], points: Floats) -> Any:
 
 
 def _check(item: Element, path: Path) -> None:
-    """ValueError where numbers are not in the file at ``path`` or in HDF5 files beside it, or are too many."""
+    """ValueError if numbers are not in the file at ``path`` or in HDF5 files beside it, or are too many."""
     if item.get("Format") == "XML":
         return
     if item.get("Format") != "HDF":
@@ -51,7 +51,7 @@ def _check(item: Element, path: Path) -> None:
 
 
 def _check_dataset(file: Any, place: str) -> None:
-    """ValueError where the dataset at a ``place`` in an HDF5 file is stored outside of the file, or is too large."""
+    """ValueError if the dataset at a ``place`` in an HDF5 file is stored outside of the file, or is too large."""
     import h5py
 
     names = ["", *place.strip("/").split("/")]

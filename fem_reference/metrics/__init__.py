@@ -1,8 +1,8 @@
 """Metrics: one file each, named as in scene files and JSON. A metric does not know the solver of a run.
 
 Contract (tests/contracts/test_every_metric.py): a run against itself gives zero, a known change a known value, NaN stays NaN, and
-units are stated. Each metric describes its ``STATISTICS`` and states the part of a run that it is ``OF`` (surface, lines or field)
-and the standard that it is measured ``AGAINST``: the reference (or the rest state), the exact solution, or the run itself.
+units are stated. Each metric describes its ``STATISTICS`` and states the part of a run that it measures (``OF``: surface, lines or
+field) and its standard (``AGAINST``): the reference (or the rest state), the exact solution, or the run itself.
 """
 
 import importlib
@@ -34,11 +34,11 @@ Shown = Literal["main", "table", "headline", "curve", "angle", "solvers", "scene
 class Statistic:
     """The description of a statistic by its metric.
 
-    ``title`` and ``part``: headings of its group of columns and its column; ``headline``: a sentence with ``{}`` for its value;
-    ``curve``: the title of the drawing of its changes from rest; ``share_of``: the quantity that is 100 %; ``shown``: by place,
-    its position there, the least first; ``local``: True where its error has the order of the error at the worst place; ``lone``:
-    True for the value of a single fibre, or of the force on a bone, which is no mean; ``pooled``: True where the statistics of its
-    metric are of one field in one unit, so that a difference that is small by chance in one is replaced by the rms of all.
+    ``title`` and ``part``: headings of the group of columns and of the column. ``headline``: a sentence with ``{}`` for the value.
+    ``curve``: the title of the drawing of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: its position by
+    place, the least first. ``local``: True if its error has the order of the error at the worst place. ``lone``: True for the value
+    of a single fibre or of the force on a bone, which is not a mean. ``pooled``: True if the statistics of its metric belong to one
+    field in one unit; the rms of all then replaces a difference that is small by chance.
     """
 
     unit: str
@@ -59,14 +59,14 @@ class Statistic:
 
     @property
     def full_unit(self) -> str:
-        """The unit; for per cent with the quantity that is 100 %."""
+        """The unit; for per cent together with the quantity that is 100 %."""
         return f"{self.unit} of {self.share_of}" if self.share_of else self.unit
 
 
 @dataclass(frozen=True, eq=False)
 class Measure:
-    """One statistic of one metric: ``values`` (f,) in ``unit`` at frame ``numbers`` (f,), which count from 0 where not given;
-    ``where`` (f,): the worst place at each frame, in words; ``error_bars`` (f,) of the reference, None where it has none.
+    """One statistic of one metric: ``values`` (f,) in ``unit`` at frame ``numbers`` (f,), which count from 0 if not given.
+    ``where`` (f,): the worst place at each frame, in words. ``error_bars`` (f,): bars of the reference, None if it has none.
     """
 
     metric: str
@@ -84,7 +84,7 @@ class Measure:
 
     @property
     def worst_number(self) -> "Worst | None":
-        """The worst frame among those with a finite value, None where there are none."""
+        """The worst frame among those with a finite value, None if there are none."""
         known = np.isfinite(self.values)
         return self._at(np.where(known, np.abs(self.values), -1.0)) if known.any() else None
 
@@ -102,8 +102,8 @@ class Measure:
 
 @dataclass(frozen=True)
 class Worst:
-    """A measure in its worst ``frame`` (a number, at ``index``): its ``value`` and the ``error_bar`` of the reference, None where
-    there is none, both in ``unit``; ``where``: the place in words.
+    """A measure in its worst ``frame`` (a number, at ``index``). ``value`` and ``error_bar``, the bar of the reference (None if
+    there is none), are in ``unit``; ``where`` is the place in words.
     """
 
     value: float
@@ -116,10 +116,10 @@ class Worst:
 
 @dataclass(frozen=True, eq=False)
 class MeasurementContext:
-    """The common context of all measurements of a case: ``areas`` (n,) [mm2] around the surface's vertices at rest, the ``fibres``
-    at rest, the ``extension`` of a surface's displacement to their points, ``travel`` [mm], the greatest displacement of the
-    reference's surface over its frames, the ``bones``, the part ``exempt`` from contact with them, the ``joints``, and the
-    ``ends`` of the fibres, None without attachments.
+    """The common context of all measurements of a case. ``areas`` (n,) [mm2]: areas around the surface's vertices at rest.
+    ``fibres``: the fibres at rest. ``extension``: carries a surface's displacement to the fibres' points. ``travel`` [mm]: the
+    greatest displacement of the reference's surface over its frames. ``bones``; ``exempt``: the part without contact with them;
+    ``joints``; ``ends``: the ends of the fibres, None without attachments.
     """
 
     areas: Floats
@@ -155,7 +155,7 @@ class MeasurementContext:
 
 @dataclass(frozen=True)
 class FieldContext:
-    """The context of all measurements of a scalar case: the formula of the ``exact`` solution, None where it is not known."""
+    """The context of all measurements of a scalar case: the formula of the ``exact`` solution, None if it is not known."""
 
     exact: str | None
 
@@ -168,7 +168,7 @@ def context_of(setup: Setup, reference: Run) -> MeasurementContext: ...
 @overload
 def context_of(setup: CaseSetup, reference: Run) -> Context: ...
 def context_of(setup: CaseSetup, reference: Run) -> Context:
-    """The :data:`Context` of a case's runs; InputError where the ``reference`` of a muscle lacks its surface or its fibres."""
+    """The :data:`Context` of a case's runs; InputError if the ``reference`` of a muscle lacks its surface or its fibres."""
     if "field" in reference.carries:
         return FieldContext(setup.exact)
     if not reference.has_surface:
@@ -176,7 +176,7 @@ def context_of(setup: CaseSetup, reference: Run) -> Context:
     if reference.fibres is None:
         place = f"{reference.name}: fibres"
         raise InputError(place, "a run without an interior", "a reference that carries the fibres")
-    own = cast("Setup", setup)  # of a single muscle: of several, each is measured by itself
+    own = cast("Setup", setup)  # for a single muscle; several muscles are measured one by one
     context = MeasurementContext.of(reference, reference.fibres, own.bones, own.exempt, own.joints)
     return replace(context, ends=attached_ends(own.attached, context.exempt, reference.fibres))
 
@@ -198,13 +198,13 @@ def metric(name: str) -> Metric:
 
 
 def names(against: Collection[Standard] | None = None) -> list[str]:
-    """The names of all metrics, or of those measured ``against`` one of these standards."""
+    """The names of all metrics, or of the metrics measured ``against`` one of these standards."""
     return [name for name in modules.names(__path__) if against is None or metric(name).AGAINST in against]
 
 
 @cache
 def described(where: Shown | None = None) -> dict[tuple[str, str], Statistic]:
-    """The statistics by metric and name: all, or those shown at one place, in their order there."""
+    """The statistics by metric and name: all, or only the statistics shown at one place, in the order of that place."""
     found = {(name, one): each for name in names() for one, each in metric(name).STATISTICS.items()}
     if where is None:
         return found
@@ -218,13 +218,13 @@ def in_tables() -> tuple[str, ...]:
 
 
 def units(of: Collection[Part] | None = None, against: Collection[Standard] | None = None) -> dict[str, str]:
-    """The units by ``metric.statistic``: of all metrics, or of those ``of`` these parts and ``against`` these standards."""
+    """The units by ``metric.statistic``: of all metrics, or of metrics ``of`` these parts and ``against`` these standards."""
     chosen = [name for name in names(against) if of is None or metric(name).OF in of]
     return {f"{name}.{one}": each.unit for (name, one), each in described().items() if name in chosen}
 
 
 def of_itself(name: str) -> bool:
-    """True where the metric ``name`` describes a run alone and does not depend on a reference."""
+    """True if the metric ``name`` describes a run alone and does not depend on a reference."""
     return metric(name).AGAINST != "reference"
 
 
@@ -250,7 +250,7 @@ def measures(name: str, values: Mapping[str, Floats], where: Collection[str] = (
 
 
 def find(measures: Iterable[Measure], metric: str, statistic: str) -> Measure | None:
-    """The measure of this metric and statistic, None where there is none."""
+    """The measure of this metric and statistic, None if there is none."""
     return next((found for found in measures if (found.metric, found.statistic) == (metric, statistic)), None)
 
 
@@ -264,8 +264,8 @@ def at_rest(run: Run) -> Run:
 
 
 def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
-    """Every statistic of the change from rest of a ``run`` of the reference's solver, on its own fibres. Where overlaps with bones
-    are removed first, the fibres of two runs differ at rest, and its surface would have to carry those of another run.
+    """Every statistic of the change from rest of a ``run`` of the reference's solver, on the fibres of this run. If overlaps with
+    bones are removed first, the fibres of two runs differ at rest, and the surface would have to carry the fibres of another run.
     """
     own = context if run.fibres is None else replace(context, fibres=run.fibres)
     return measure(run, at_rest(run), own, wanted)
@@ -288,7 +288,7 @@ def rms(deviations: Floats, weights: Floats) -> Floats:
 
 
 def percentile(values: Floats, weights: Floats, share: float) -> float:
-    """The least of ``values`` (n,) that a ``share`` of the weight does not exceed; NaN where one is not finite."""
+    """The least of ``values`` (n,) that a ``share`` of the weight does not exceed; NaN if one is not finite."""
     if not np.isfinite(values).all():
         return float("nan")
     order = np.argsort(values)

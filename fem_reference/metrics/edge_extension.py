@@ -22,8 +22,8 @@ OF, AGAINST = "surface", "reference"
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """Statistics over the edges of ``(l - l_reference) / L`` [%], L the length at rest: the signed ``mean``, the ``rms``, and
-    of the magnitude the 95th percentile (``p95``) and the greatest (``max``).
+    """Statistics over the edges of ``(l - l_reference) / L`` [%], L the length at rest: the signed ``mean`` and the ``rms``; for
+    the magnitude the 95th percentile (``p95``) and the greatest (``max``).
 
     An edge is weighted by the area around it at rest, a third of its two triangles. In ``mean_of_edges`` all edges have the same
     weight, as in the report.

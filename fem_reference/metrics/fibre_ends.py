@@ -1,8 +1,7 @@
-"""Distances of the ends of fibres from their places on the moving bones; of the run alone, independent of the reference.
-
-An end of a fibre at an attachment moves with its bone. Fibres from a file may end beside the attached area; they do not follow the
-bone, and their lengths and moment arms are not those of fibres that reach it. A run without fibres is measured on points that its
-surface carries. The attachment of an end is that of :func:`fem_reference.problems.fibre_ends.attached_ends`.
+"""Distances of the ends of fibres from their places on the moving bones; of the run alone, independent of the reference. An end of
+a fibre at an attachment moves with its bone. Fibres from a file may end beside the attached area: such fibres do not follow the
+bone, and differ in length and moment arm from fibres that reach it. A run without fibres is measured on points that its surface
+carries. :func:`fem_reference.problems.fibre_ends.attached_ends` gives the attachment of an end.
 """
 
 import numpy as np

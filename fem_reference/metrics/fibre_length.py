@@ -1,10 +1,8 @@
-"""Lengths of the fibres of a run against those of the reference, frame by frame.
-
-Two runs that both carry the fibres of the measurement context inside themselves are measured on those. Otherwise the surfaces of
-both carry them by the extension of the measurement context, so that both are measured alike. The length of a fibre includes its
-straight tendon, if it has one. A run of lines alone (a line of action) has its own points in place of the fibres'. Its whole length
-is compared, so it deviates at rest already where a straight line is shorter than the fibre. That counts as its error, even if its
-change of length from rest is correct.
+"""Lengths of the fibres of a run compared with the reference, frame by frame. If both runs carry the fibres of the measurement
+context in their interior, these fibres are measured. Otherwise the surfaces of both runs carry the fibres by the extension of the
+measurement context, so both are measured in the same way. The length of a fibre includes its straight tendon, if any. A run of
+lines only (a line of action) has points of its own. Its total length is compared, so a straight line that is shorter than the fibre
+deviates even at rest. This counts as an error, even if the change of length from rest is correct.
 """
 
 from functools import partial
@@ -32,7 +30,8 @@ STATISTICS = {
     "max_percent": _of_lines("%", _TITLE, "worst fibre", shown={"table": 30, "claim": 60}, lone=True),
 }
 OF, AGAINST = "lines", "reference"
-# Fibre points within this distance [mm] of the measurement context's are the same points, read from a file in single precision.
+# Fibre points within this distance [mm] of the points of the measurement context are the same points, read from a file in single
+# precision.
 _SAME = 1e-3
 # The same for a run of lines alone: a reference begins up to this far from the rest state if overlaps with bones were removed.
 _RELAXED = 5.0
@@ -74,7 +73,7 @@ def fibre_points(run: Run, context: MeasurementContext) -> Floats:
 def extension_error(reference: Run, context: MeasurementContext) -> Measure:
     """The greatest error [mm] over the fibres of lengths by the extension, measured on the reference's own surface.
 
-    The error is L by extension minus L inside; NaN where the reference does not carry the measurement context's fibres.
+    The error is L by extension minus L inside; NaN if the reference does not carry the fibres of the measurement context.
     """
     if _carries(reference, context):
         errors = _lengths(reference, context, inside=False) - _lengths(reference, context, inside=True)
@@ -85,7 +84,7 @@ def extension_error(reference: Run, context: MeasurementContext) -> Measure:
 
 
 def _carries(run: Run, context: MeasurementContext) -> bool:
-    """True where the fibres of ``run`` are those of the measurement context."""
+    """True if the fibres of ``run`` are the fibres of the measurement context."""
     if run.fibres is None or run.fibre_positions is None or run.fibres.points.shape != context.fibres.points.shape:
         return False
     same_lines = np.array_equal(run.fibres.offsets, context.fibres.offsets)

@@ -1,6 +1,7 @@
 """Shares of a run's surface that are inside out or lie within another part of the body, against the reference.
 
-It is computed from the surface alone, so every run has it; where a solver has an interior, its smallest det F is stricter.
+The shares are computed from the surface alone, so every run has them. For a solver with an interior, the smallest det F is
+stricter.
 """
 
 from functools import lru_cache
@@ -18,7 +19,7 @@ OF, AGAINST = "surface", "reference"
 
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
     """Shares of the surface, by its area at rest, minus those of the reference [%]: ``inside_out``, triangles whose outer side
-    faces a part of the body that is turned inside out, and ``overlapping``, those that lie inside another part of it.
+    faces a part of the body that is turned inside out, and ``overlapping``, triangles inside another part of the body.
 
     NaN in a frame where a triangle has collapsed: it has no outer side.
     """

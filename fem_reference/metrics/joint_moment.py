@@ -1,10 +1,9 @@
-"""Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis.
+"""Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis. A
+moment is positive if it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in space.
+By virtual work, without dissipation, the moment is minus the slope of the stored energy in the angle. Lines of action pull at their
+ends, via-points and obstacles. The force is not known for lines without ``hill`` and for most fast solvers.
 
-A moment is positive where it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in
-space. By virtual work, without dissipation, the moment is minus the slope of the stored energy in the angle. Lines of action pull
-at their ends, via-points and obstacles. The force is not known for lines without ``hill``, nor for most fast solvers.
-
-The arm differs from that by the excursion of fibres: a bent matrix bears a moment with little force (docs/measures.md).
+The arm differs from the arm by the excursion of fibres: a bent matrix carries a moment with little force (docs/measures.md).
 """
 
 from functools import partial
@@ -39,7 +38,7 @@ _LEAST = 1e-6  # a force below this share of the greatest one is round-off and h
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Differences of ``moment`` [N mm], ``force`` [N], ``arm`` [mm]: NaN where no joint turns alone; the arm also without force."""
+    """Differences of ``moment`` [N mm], ``force`` [N], ``arm`` [mm]: NaN if no joint turns alone; the arm also without force."""
     joints = [joint for joint in context.joints if _has_force(run, joint)]
     # The rest state of a run, which has no force, is the standard for its change from rest.
     if not joints or not (reference.solver == "rest" or all(_has_force(reference, joint) for joint in joints)):
@@ -51,21 +50,16 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
     return measures("joint_moment", dict(zip(STATISTICS, found, strict=True)))
 
 
-def force_arms(run: Run, joint: Joint) -> Floats:
-    """The moment arm (f,) [mm] of the force on the bone of a ``joint``: its moment over its magnitude; NaN where there is none.
-
-    Of a muscle that is a line between two bones, around obstacles on these too, it is ``-dl/dtheta``; of any other, by virtual
-    work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
-    """
-    return np.asarray(_values(run, joint)[2])
-
-
 def _has_force(run: Run, joint: Joint) -> bool:
     return joint.bone.name in vector_names(run.scalars, "force_on_")
 
 
 def _values(run: Run, joint: Joint) -> Floats:
-    """Moment, force and arm by frame (3, f)."""
+    """Moment, force and arm by frame (3, f).
+
+    The arm of a muscle that is a line between two bones, around obstacles on these too, is ``-dl/dtheta``; that of any other, by
+    virtual work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
+    """
     moment = run.moment(joint.bone.name, joint.centre) @ joint.axis
     force = np.linalg.norm(run.force(joint.bone.name), axis=1)
     known = force > _LEAST * force.max(initial=0.0)

@@ -8,7 +8,7 @@ OF, AGAINST = "field", "itself"
 
 
 def measure(run: Run, _reference: Run, _context: FieldContext) -> tuple[Measure, ...]:
-    """``value``, the greatest over the vertices; NaN where one is not a number."""
+    """``value``, the greatest over the vertices; NaN if any value is NaN."""
     values = run.vertex_values
     where = at_vertices(run, values.argmax(axis=1))
     return measures("maximum", {"value": values.max(axis=1)}, where)

@@ -1,9 +1,9 @@
 """Moment arms of the fibres about the rotating joint, by the tendon excursion method: ``-dl/dtheta`` (An et al. 1984).
 
-``l`` [mm] is the length of a fibre, ``theta`` [rad] the angle of the joint; an arm is positive where the muscle shortens as
-the angle grows, as in OpenSim. The slope is that of the parabola through three frames, with an error of second order in their
-angles. A frame at which the joint is at rest takes the slope of the frames nearest in time. Where more than one bone moves,
-lengths do not depend on one angle alone, and the arm is NaN. A case without a joint has no moment arms.
+``l`` [mm] is the length of a fibre, ``theta`` [rad] the angle of the joint; an arm is positive if the muscle shortens as the angle
+grows, as in OpenSim. The slope is taken from the parabola through three frames; its error is of second order in their angles. A
+frame at which the joint is at rest takes the slope of the frames nearest in time. If more than one bone moves, lengths do not
+depend on one angle alone, and the arm is NaN. A case without a joint has no moment arms.
 """
 
 from collections.abc import Iterator, Sequence
@@ -45,7 +45,7 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 
 
 def excursion_arms(lengths: Floats, context: MeasurementContext, numbers: Sequence[int]) -> Floats:
-    """``-dl/dtheta`` (f, k) [mm] of ``lengths`` (f, k) [mm] at the frames ``numbers``; NaN where no joint rotates alone."""
+    """``-dl/dtheta`` (f, k) [mm] of ``lengths`` (f, k) [mm] at the frames ``numbers``; NaN if no joint rotates alone."""
     which, arms = turning(context.joints, context, numbers), np.full(lengths.shape, np.nan)
     for frame, i in enumerate(which):
         if i >= 0:
@@ -79,7 +79,7 @@ def _near(angles: Floats, frame: int) -> list[int]:
 
 
 def _onward(angles: Floats, frames: range, start: int) -> Iterator[int]:
-    """Up to two of ``frames`` whose angles continue from that at ``start`` in one direction."""
+    """Up to two of ``frames`` whose angles continue in one direction from the angle at ``start``."""
     direction, last, found = 0.0, start, 0
     for frame in frames:
         step = float(angles[frame] - angles[last])

@@ -17,14 +17,14 @@ STATISTICS = {
         headline="{} deep in another muscle",
         curve="Depth to which the muscle and another one penetrate each other",
         shown={"curve": 52, "headline": 60},
-    ),
+    )
 }
 OF, AGAINST = "surface", "itself"
 
 
 def measure(run: Run, _reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """``deepest`` [mm], as in ``geometry.interpenetration.penetration``: the greatest depth of this muscle and another in each
-    other, by their surfaces, 0 where they are apart. NaN in a frame in which a surface is not known; no measure where the run has
+    """``deepest`` [mm], as in ``geometry.interpenetration.penetration``: the greatest depth to which the surfaces of this muscle
+    and another penetrate each other, 0 if they are apart. NaN in a frame in which a surface is not known; no measure if the run has
     no other muscle.
     """
     return _measured(run) if run.others else ()

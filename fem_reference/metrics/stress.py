@@ -1,8 +1,8 @@
 """Stresses in the volume of a muscle, from solvers that have them: means and quantiles over the volume at rest.
 
-They are the Cauchy stress along the present fibres, the von Mises stress, and the pressure, above 0 in compression, at four points
-of each tetrahedron. The greatest stress is no measure: at the rim of an attachment it grows without bound as tetrahedra get
-smaller. Runs without stresses have no such measures.
+The stresses are the Cauchy stress along the present fibres, the von Mises stress, and the pressure, above 0 in compression, at four
+points of each tetrahedron. The greatest stress is not measured: at the rim of an attachment it grows without bound on finer meshes.
+Runs without stresses have no such measures.
 """
 
 from functools import partial

@@ -1,7 +1,5 @@
-"""Distance of a run's surface from the reference's: material (the same vertex) and geometric (the closest point).
-
-A surface that slides along itself deviates materially and not geometrically. All means are weighted by the area
-around each vertex at rest.
+"""Distance of a run's surface from the reference's surface: material (the same vertex) and geometric (the closest point). A surface
+that slides along itself deviates materially but not geometrically. All means are weighted by the area around each vertex at rest.
 """
 
 import numpy as np
@@ -37,11 +35,11 @@ OF, AGAINST = "surface", "reference"
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Material: ``rms``, ``p95`` (area-weighted 95th percentile) and ``max`` of the distance of the same vertex [mm].
+    """Material: ``rms``, ``p95`` (area-weighted 95th percentile) and ``max`` of the distance between corresponding vertices [mm].
 
-    Geometric: ``distance_mean``, ``distance_rms`` and ``hausdorff`` [mm] of the distances from the vertices of each surface to
-    the closest point of the other, over both directions. Only vertices are sampled, so ``hausdorff`` is a lower bound of the
-    Hausdorff distance. Each is also given as ``..._percent`` of the reference's greatest displacement.
+    Geometric: ``distance_mean``, ``distance_rms`` and ``hausdorff`` [mm] of the distances from the vertices of each surface to the
+    closest point of the other surface. Only vertices are sampled, so ``hausdorff`` is a lower bound of the Hausdorff distance. Each
+    statistic is also given as ``..._percent`` of the reference's greatest displacement.
     """
     material = np.linalg.norm(run.positions - reference.positions, axis=2)
     geometric = np.array([_both_directions(run, reference, frame) for frame in range(len(reference.positions))])
@@ -65,7 +63,7 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 
 
 def _both_directions(run: Run, reference: Run, frame: int) -> Floats:
-    """Distances (2n,) [mm] of vertices of the run to the reference's surface and the reverse; NaN where not finite."""
+    """Distances (2n,) [mm] of vertices of the run to the reference's surface and the reverse; NaN if not finite."""
     here, there = (each.surface.moved_to(each.positions[frame]) for each in (run, reference))
     if np.array_equal(here.points, there.points):
         return np.zeros(len(here.points) + len(there.points))
@@ -75,7 +73,9 @@ def _both_directions(run: Run, reference: Run, frame: int) -> Floats:
 
 
 def _percent(values: Floats, travel: float) -> Floats:
-    """``values`` (f,) [mm] in per cent of ``travel`` [mm]; where the travel is 0, 0 for a value of 0 and infinite for others."""
+    """``values`` (f,) [mm] in per cent of ``travel`` [mm]; if the travel is 0, they are 0 for a value of 0 and infinite for other
+    values.
+    """
     if travel == 0:
         return np.where(values == 0, 0.0, values + np.inf)
     return np.asarray(100 * values / travel)

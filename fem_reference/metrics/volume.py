@@ -6,8 +6,8 @@ from fem_reference.foundations.mesh import enclosed_volume
 from fem_reference.metrics import Measure, MeasurementContext, Shown, Statistic, measures
 from fem_reference.runs.store import Run
 
-_FIRST: tuple[Shown, ...] = ("main", "table", "curve", "solvers", "scenes")  # places where the volume comes first
-# The volume is nearly constant, so its error tells little about the order: it counts with that of the worst place.
+_FIRST: tuple[Shown, ...] = ("main", "table", "curve", "solvers", "scenes")  # places at which the volume comes first
+# The volume is nearly constant, so its error hardly shows the order: the order of the worst place is used.
 STATISTICS = {
     "deviation": Statistic(
         "%",

@@ -33,7 +33,7 @@ _SIDE = 2.0
 
 
 def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
-    """The sorted vertices (k,) of the muscle's ``surface`` that ``case.attachment[i]`` selects, to a bone with ``bone_surface``.
+    """The sorted vertices (k,) of the muscle's ``surface`` that ``case.attachment[i]`` attaches to a bone with ``bone_surface``.
     InputError names the unusable key of the case, or the file and row (not counting comment lines).
     """
     attachment = case.attachment[i]
@@ -62,7 +62,7 @@ def unshifted(case: MuscleCase) -> MuscleCase:
 
 
 def tendon_of(case: MuscleCase, i: int) -> Floats | None:
-    """The point (3,) [mm] of the tendon of ``case.attachment[i]``: the middle of its landmarks; None where it has none."""
+    """The point (3,) [mm] of the tendon of ``case.attachment[i]``: the middle of its landmarks; None without a tendon."""
     if (tendon := case.attachment[i].tendon) is None:
         return None
     key = f"attachment[{i}].tendon"
@@ -75,9 +75,9 @@ def tendon_of(case: MuscleCase, i: int) -> Floats | None:
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
-    """The boundary triangles (m, 3) of a ``mesh`` inside a ``surface``, outward, that lie under the attached part of the surface,
-    although they do not follow its rim: their attached share, averaged over seven samples, is above a half. ``shares`` (k, 3): the
-    attached shares of the corners of each triangle of ``surface``.
+    """The boundary triangles (m, 3) of a ``mesh`` inside a ``surface``, outward, under the attached part of the surface, whose rim
+    they do not follow: their attached share, averaged over seven samples, is above a half. ``shares`` (k, 3): the attached shares
+    of the corners of each triangle of ``surface``.
     """
     triangles, _ = boundary(mesh.tets)
     samples = np.einsum("qk,mkd->mqd", _SAMPLES, mesh.points[triangles]).reshape(-1, 3)
@@ -104,7 +104,7 @@ def _listed(path: Path, chosen: VertexList, count: int) -> Ints:
 
 
 def _is_header(cell: str) -> bool:
-    """True where the first cell of a list is a word: it has a letter and does not begin like a number (``1e5``)."""
+    """True if the first cell of a list is a word: the cell has a letter and does not begin like a number (``1e5``)."""
     return any(character.isalpha() for character in cell) and re.match(r"[-+.]?\d", cell) is None
 
 
@@ -133,10 +133,9 @@ def _patches(path: Path, outline: Outline, place: str) -> Surface:
 
 
 def draped(patches: Surface, bone_surface: Surface) -> Surface:
-    """The patches draped on the bone: in triangles with sides of at most 2 mm, whose corners are moved to its nearest points.
-
-    Landmarks lie on the bone, but over a hollow the triangles between them do not: over the iliac fossa they are 13 mm off, more
-    than the thickness of the muscle there.
+    """The patches draped on the bone: triangles with sides of at most 2 mm, whose corners are moved to the nearest points of the
+    bone. Landmarks lie on the bone, but triangles between them need not: over the hollow of the iliac fossa they are 13 mm off the
+    bone, more than the thickness of the muscle.
     """
     longest = _longest_side(patches)
     if len(patches.triangles) * (longest / _SIDE) ** 2 > _MOST_TRIANGLES:
@@ -147,7 +146,7 @@ def draped(patches: Surface, bone_surface: Surface) -> Surface:
     return patches.moved_to(distances(patches.points, bone_surface).closest)
 
 
-@np.errstate(over="ignore")  # squares overflow for a point that is infinitely far away
+@np.errstate(over="ignore")  # squares overflow for a point at infinity
 def _longest_side(surface: Surface) -> float:
     return float(edge_lengths(surface.points[surface.triangles]).max())
 
@@ -184,7 +183,7 @@ log = logging.getLogger(__name__)
 
 # Fibres are traced in a separate mesh of about this many tets.
 TETS = 8000
-# Lines traced for each surface fibre needed; the outermost, just below the surface, become the surface fibres.
+# Lines traced for each required surface fibre; the outermost lines, just below the surface, become the surface fibres.
 _OUTER = 5
 
 
@@ -204,8 +203,8 @@ def _turning(case: MuscleCase) -> Floats:
 
 
 def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
-    """The fibres of a case from their source, perhaps partly outside the ``surface``, and their direction at any point: that of the
-    nearest fibre, or of a field between attachments. A source that needs tetrahedra takes them from ``fill``, by their size [mm].
+    """The fibres of a case from their source, perhaps partly outside the ``surface``, and their direction at any point, from the
+    nearest fibre or from a field between attachments. If a source needs tetrahedra, ``fill`` makes them of a size [mm].
     """
     if (lines := _given(case)) is not None:
         return lines, NearestLine(lines)
@@ -225,7 +224,7 @@ def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh
 
 
 def _along_field(mesh: TetMesh, asked: Traced, count: int) -> tuple[Polylines, Directions]:
-    """``count`` lines of the Laplace field that is ``asked`` for, and its directions."""
+    """``count`` lines of the requested (``asked``) Laplace field, and its directions."""
     if asked.flux == "area":
         flux = area_flux(mesh, asked.start, asked.end)
         return streamlines(flux, count), flux.field
@@ -239,8 +238,9 @@ def field_mesh(surface: Surface, fill: Callable[[float], TetMesh]) -> TetMesh:
 
 
 def lean(case: MuscleCase, axis: Floats) -> float:
-    """The lean of given fibres against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, with a their angle to
-    it. It scales the shear by their tension. Traced and mapped fibres follow the axis, except for pennation and rotation.
+    """The lean of given fibres against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, with a the angle between
+    fibre and axis. The lean scales the shear by the tension of fibres. Traced and mapped fibres follow the axis, except for
+    pennation and rotation.
     """
     turning = _turning(case)
     if (lines := _given(case)) is None:
@@ -255,7 +255,7 @@ def lean(case: MuscleCase, axis: Floats) -> float:
 
 
 def _given(case: MuscleCase) -> Polylines | None:
-    """The fibres in the files of a case, or those between the surface fibres in its files; None where it has neither."""
+    """The fibres in the files of a case, or fibres between the surface fibres in its files; None if it has neither."""
     if (given := case.fibres.polylines) is not None:
         return _read(case, given, "fibres.polylines")
     if (asked := case.fibres.chmd) is not None and asked.heads is not None:
@@ -269,7 +269,9 @@ def _read(case: MuscleCase, given: PolylineFile, key: str) -> Polylines:
 
 
 def inside(surface: Surface, fibres: Polylines) -> Polylines:
-    """The fibres with each point outside the ``surface`` moved to its nearest point, as there is no solution outside."""
+    """The fibres with each point outside the ``surface`` moved to the nearest point of the surface, as there is no solution
+    outside.
+    """
     away = signed_distances(fibres.points, surface)
     points = np.array(fibres.points)
     points[away > 0] = distances(points[away > 0], surface).closest

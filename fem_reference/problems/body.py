@@ -24,8 +24,8 @@ from fem_reference.problems.touching import Touching
 
 _OUTWARDS = 0.7  # fields are also checked this far along the path from the middle of a cell to each node
 Kind = Literal["tetrahedron", "hexahedron"]
-# By element: kind of cell, degree of the displacement, degree of the pressure (None: there is no such unknown; 0: it is constant in
-# each cell). Where both are of one degree, solvers stabilise the pressure (``is_stabilised``).
+# By element: kind of cell, degree of the displacement, degree of the pressure (None: no pressure unknown; 0: constant in each
+# cell). If both degrees are equal, solvers stabilise the pressure (``is_stabilised``).
 ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
     "P1": ("tetrahedron", 1, None),
     "P1/P1": ("tetrahedron", 1, 1),
@@ -43,7 +43,8 @@ def is_stabilised(element: str) -> bool:
     """True for an element with displacement and pressure of the same degree: its pressure would oscillate without stabilisation.
 
     The added energy is ``-1 / (4 mu) integral of (p - its mean in the cell)^2``, with the cell's shear modulus mu at rest: the mean
-    of the second derivatives of the energy with respect to F_ij, i != j. It falls with the square of the cell size.
+    of the second derivatives of the energy with respect to F_ij, i != j. The added energy decreases with the square of the cell
+    size.
 
     Source: Dohrmann and Bochev 2004, doi 10.1002/fld.752; with 2 mu as in White and Borja 2008, doi 10.1016/j.cma.2008.05.015.
     """
@@ -52,7 +53,7 @@ def is_stabilised(element: str) -> bool:
 
 
 def outer_facets(mesh: "Cells") -> tuple[Ints, Ints]:
-    """The facets that belong to one cell only, as sorted corners (f, 3 or 4) as in ``facet_corners``, and that cell (f,)."""
+    """The facets that belong to one cell only, as sorted corners (f, 3 or 4) as in ``facet_corners``, and this cell (f,)."""
     sides = np.array(facet_corners(mesh.kind))
     every = mesh.cells[:, sides].reshape(-1, sides.shape[1])
     _, first, counts = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
@@ -70,7 +71,7 @@ def facet_corners(kind: Kind) -> list[tuple[int, ...]]:
 
 def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, ...], place: str) -> None:
     """Raise an InputError that names ``place`` unless an ``element``, a key of ``ELEMENTS``, suits cells and effects: its
-    displacement is of the ``degree`` of the cells or above, and it has a pressure if and only if an effect needs it.
+    displacement has the ``degree`` of the cells or a higher one, and it has a pressure if and only if an effect needs a pressure.
     """
     if element not in ELEMENTS:
         raise InputError(place, f'"{element}"', f"one of {', '.join(ELEMENTS)}")
@@ -96,7 +97,7 @@ def check_stiffness(effects: tuple[Effect, ...], place: str) -> None:
 
 
 def check_quadrature(element: str, degree: int | None, place: str) -> None:
-    """Raise an InputError where quadrature of a ``degree`` cannot integrate the variation of a stabilised pressure in a cell."""
+    """Raise an InputError if quadrature of a ``degree`` cannot integrate the variation of a stabilised pressure in a cell."""
     if degree == 1 and is_stabilised(element):
         raise InputError(place, degree, f"2 or more for {element}, whose pressure is stabilised")
 
@@ -140,9 +141,9 @@ class Cells:
 class Prescribed:
     """A prescribed displacement of a part of the surface, ``on`` a region of ``Cells.facets`` or on a skin; its reaction force is
     reported under its ``name``. ``components``: the prescribed axes, 0, 1, 2 for x, y, z. ``path``: a picklable callable of rest
-    points (n, 3) [mm] and a frame number, which returns displacements (n, 3) [mm]. ``stiffness`` [MPa/mm]: that of springs over the
-    area, which pull towards the path; None where the displacement is exact. A skin has springs only. ``anchor`` [mm]: the rest
-    place of a point on the path, to which all springs of a skin go as straight tendons: each pulls along its line while the line is
+    points (n, 3) [mm] and a frame number, which returns displacements (n, 3) [mm]. ``stiffness`` [MPa/mm]: the stiffness of springs
+    over the area, which pull towards the path; None if the displacement is exact. A skin has springs only. ``anchor`` [mm]: the
+    rest place of a point that follows the path. All springs of a skin go to this point as straight tendons, and pull while they are
     longer than at rest.
     """
 
@@ -154,7 +155,7 @@ class Prescribed:
     anchor: tuple[float, float, float] | None = None
 
     def displacements(self, points: Floats, frame: float) -> Floats:
-        """The path's displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components; InputError where it gives none."""
+        """The path's displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components; InputError if it gives none."""
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:
             found = np.asarray(self.path(np.array(points), frame))
@@ -188,9 +189,9 @@ class ByCell:
 class Body:
     """A body of ``mesh`` with its ``effects``, at rest at ``frames[0]``. A load acts on the facets that its ``on`` names;
     ``contact``, if any, acts with every bone, and ``touching`` between parts of the surface. ``interval`` [s]: the time between
-    frame numbers, None where nothing depends on time. ``start``: the map of rest points (n, 3) to their positions at ``frames[0]``,
-    where the body does not start at rest; ``regions``: by name, those in which effects act. Those of one of several pieces lie
-    ``within`` a range of cells, the first and the one after the last.
+    frame numbers, None if nothing depends on time. ``start``: the map of rest points (n, 3) to their positions at ``frames[0]``, if
+    the body does not start at rest. ``regions``: the regions in which effects act, by name. ``within``: for regions of one of
+    several pieces, the range of its cells.
     """
 
     mesh: Cells
@@ -228,17 +229,17 @@ class Body:
 
     @property
     def rubs(self) -> bool:
-        """True where there is friction, so that a state depends on the path to it."""
+        """True if there is friction, so that a state depends on the path to it."""
         return any(one is not None for one in self.frictions)
 
     @property
     def remembers(self) -> bool:
-        """True where contact depends on earlier states: where there is friction, or a part of the surface touches itself."""
+        """True if contact depends on earlier states: if there is friction, or a part of the surface touches itself."""
         return self.rubs or any(law.one == law.other for law in self.touching)
 
     @property
     def frictions(self) -> list[float | None]:
-        """The coefficients of friction of contact and of each pair of touching parts, None where it has none."""
+        """The coefficients of friction of contact and of each pair of touching parts, None without friction."""
         own = [self.contact.friction] if self.contact else []
         return [*own, *(law.friction for law in self.touching)]
 

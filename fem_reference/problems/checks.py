@@ -24,18 +24,20 @@ from fem_reference.problems.body import (
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.touching import Touching, check_touching
 
-SAME = 1e-6  # share of the body's size by which two regions that prescribe the same may differ
+SAME = 1e-6  # share of the body's size by which two prescriptions of one displacement may differ
 _FLAT = 1e-9  # a cell counts as flat below this share of its longest edge cubed
 _FARTHEST = 1e9  # [mm] from the origin
 _MOST = 100_000  # frames
 _MOST_CELLS = 10_000_000  # cells of a box
 _SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each other
-_THINNEST = 1e6  # length over thickness of a cell: stiffnesses differ by its square, too much for 16 digits
+_THINNEST = (
+    1e6  # length over thickness of a cell: stiffnesses differ by the square of this ratio, too much for 16 digits
+)
 
 
 def check(body: Body, element: str, quadrature_degree: int | None = None) -> None:
-    """Raise InputError unless ``body`` is valid, ``element`` suits its cells and effects, all regions and fibre directions that it
-    needs exist, its constraints agree and can be followed and solved, and ``quadrature_degree`` suits the element.
+    """Raise InputError unless ``body`` is valid, ``element`` suits its cells and effects, all required regions and fibre directions
+    exist, its constraints agree and can be followed and solved, and ``quadrature_degree`` suits the element.
     """
     if not isinstance(body, Body):
         raise InputError("body", said(body), "a Body")
@@ -120,7 +122,7 @@ def _check_many(place: str, given: Any, kind: type, want: str) -> None:
 
 
 def _check_rest(body: Body) -> None:
-    """Raise InputError where an optional part of a body has the wrong type."""
+    """Raise InputError if an optional part of a body has the wrong type."""
     if body.interval is not None and not (_is_number(body.interval) and body.interval > 0):
         raise InputError("interval", said(body.interval), "a time above 0 s, or None")
     for name in ("fibre", "start"):
@@ -176,7 +178,7 @@ def _check_volumes(mesh: Cells) -> None:
 
 
 def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
-    """Raise InputError where two entries share a name, under which forces are reported, or a spring stiffness is not positive."""
+    """Raise InputError if two entries share a name, under which forces are reported, or a spring stiffness is not positive."""
     names = [entry.name for entry in prescribed if isinstance(entry.name, str)]
     for entry in prescribed:
         place = f"prescribed.{entry.name}"
@@ -216,7 +218,7 @@ def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
 
 
 def _check_needs(body: Body) -> None:
-    """Raise InputError where an effect needs fibre directions or times that a body lacks, or directions are not unit vectors."""
+    """Raise InputError if an effect needs fibre directions or times that a body lacks, or directions are not unit vectors."""
     needs = {need for effect in body.effects for need in effect.needs}
     if body.interval is None and "interval" in needs:
         raise InputError("interval", "nothing", "the time from a frame number to the next, which an effect needs")
@@ -229,10 +231,10 @@ def _check_needs(body: Body) -> None:
 
 
 def check_agreement(body: Body) -> None:
-    """Raise InputError where a part of the body lacks a law (``regions.check``), the normal of a law is along fibres, a tendon or
+    """Raise InputError if a part of the body lacks a law (``regions.check``), the normal of a law is along fibres, a tendon or
     friction is combined with tension at rest, a load is on a part that is prescribed exactly, two regions of its surface prescribe
     different exact displacements at shared places, or a path of motion cannot be followed. Displacements are compared at all
-    frames, all stops, and the middles between them.
+    frames, at all stops, and halfway between them.
     """
     regions.check(body)
     directions.check_normals(body)
@@ -255,7 +257,7 @@ def check_agreement(body: Body) -> None:
 
 
 def _check_start(body: Body) -> None:
-    """Raise InputError where a prescribed displacement is not zero at the first frame, at which a body is at rest."""
+    """Raise InputError if a prescribed displacement is not zero at the first frame, at which a body is at rest."""
     for entry in body.prescribed if body.start is None else ():
         off = np.abs(entry.displacements(body.points_on(entry.on), body.frames[0])).max(initial=0.0)
         if not off <= SAME * body.size:
@@ -265,7 +267,7 @@ def _check_start(body: Body) -> None:
 
 
 def _shared(mesh: Cells, one: str, other: str) -> Floats:
-    """The corners that two regions share, and the middles of the edges that they share (n, 3) [mm]."""
+    """The corners, and the middles of edges, that two regions share (n, 3) [mm]."""
     count = len(mesh.points)
 
     def edges(name: str) -> Ints:
@@ -279,7 +281,7 @@ def _shared(mesh: Cells, one: str, other: str) -> Floats:
 
 
 def check_thinness(mesh: TetMesh) -> None:
-    """Raise InputError where a cell is too thin for double precision."""
+    """Raise InputError if a cell is too thin for double precision."""
     corners = mesh.points[mesh.tets]
     longest = np.linalg.norm(corners[:, [0, 0, 0, 1, 1, 2]] - corners[:, [1, 2, 3, 2, 3, 3]], axis=2).max(axis=1)
     ratios = longest**3 / (6 * tet_volumes(mesh.points, mesh.tets))

@@ -13,11 +13,12 @@ from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.signed_distance import FAR, signed_distances
 from fem_reference.geometry.skins import Skin
 
-# The largest share of the unattached surface that may be exempt from contact; there is a warning above half of it.
+# The largest share of the unattached surface that may be exempt from contact; above half of this share there is a warning.
 _LOST = 0.5
-# The least half thickness of a bone, in spacings of contact points: a thinner bone would pass between four points, 0.71 from each.
+# The least half thickness of a bone, in spacings of contact points: a thinner bone would pass between four points at a distance of
+# 0.71 from each.
 _THINNEST = 0.75
-# Above this share of a bone's half thickness, the side to which an overlap at rest is to be removed is not defined.
+# Above this share of half a bone's thickness, the direction in which to remove an overlap at rest is not defined.
 _MIDDLE = 0.95
 
 log = logging.getLogger(__name__)
@@ -35,22 +36,22 @@ class ContactBone:
 @dataclass(frozen=True)
 class ContactLaw:
     """Contact of bones with any amount of sliding. ``on``: the name of a region of facets, or a skin. The pressure depends on the
-    gap g, the signed distance (negative inside): zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)`` from d to -d, and
-    ``-k g`` deeper: the slope of an energy per rest area, twice differentiable. ``stiffness``: k [MPa/mm]; under pressure p a
-    surface penetrates by p / k.
+    gap g, the signed distance (negative inside): zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k
+    g`` below -d. It is the slope of an energy per rest area that is twice differentiable. ``stiffness``: k [MPa/mm]; under pressure
+    p a surface penetrates by p / k.
 
-    ``relaxed``: two frame numbers between which an overlap at rest is removed gradually: it causes no pressure at the first, and
-    counts in full from the second on.
+    ``relaxed``: two frame numbers between which an overlap at rest is removed gradually: at the first it causes no pressure, from
+    the second on it counts in full.
 
-    ``in_situ`` [mm], of a body under tension at rest: points whose gap is within this distance, or that overlap a bone, touch it
-    there, with the pressure that balances the tension (``effects.in_situ``); later only the change of the gap of such a point
-    counts.
+    ``in_situ`` [mm], for a body under tension at rest: points that overlap a bone, or whose gap is within this distance, touch the
+    bone at rest, with the pressure that balances the tension (``effects.in_situ``). Later only the change of the gap of such a
+    point counts.
 
     ``friction``: the coefficient of Coulomb's law, None without friction. A point sticks to the bone by a spring of the stiffness
     k, and slides at a traction of ``friction`` times the pressure.
 
-    ``parts``: of several bodies solved as one, the name of each, and the first point of its part of the skin and the one after the
-    last; forces are then also reported by body.
+    ``parts``: for several bodies solved as one, the name of each and the range of its points of the skin; forces are then also
+    reported by body.
     """
 
     on: str | Skin
@@ -62,7 +63,7 @@ class ContactLaw:
     parts: tuple[tuple[str, int, int], ...] = ()
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative in the gap [MPa/mm]; NaN where the gap is NaN."""
+        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative in the gap [MPa/mm]; NaN if the gap is NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
 
     def gap(self, pressure: Floats) -> Floats:
@@ -78,7 +79,7 @@ class ContactLaw:
 
 
 def remaining(relaxed: tuple[float, float], frame: float) -> float:
-    """The share of an overlap at rest that is left at ``frame``, as it is removed between two frame numbers."""
+    """The share of an overlap at rest that is left at ``frame``, with a removal between two frame numbers."""
     first, last = relaxed
     return float(np.clip((last - frame) / (last - first), 0, 1))
 
@@ -92,7 +93,7 @@ def penalty(gap: Floats, k: float, d: float) -> tuple[Floats, Floats]:
 
 def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: float) -> Floats:
     """The smallest gap (n,) [mm], negative inside, to a ``bone`` in its rest frame on straight ``paths`` (n, 3) [mm] from their
-    ``starts`` (n, 3) [mm], sampled at strides as long as the gap safely allows, at least ``least`` [mm].
+    ``starts`` (n, 3) [mm], sampled at strides as long as the gap allows, at least ``least`` [mm].
     """
     smallest = np.full(len(starts), np.inf)
     lengths = np.linalg.norm(paths, axis=1)
@@ -109,7 +110,7 @@ def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: flo
 
 
 def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
-    """The least distance [mm] of ``points`` (n, 3) to a bone at rest; InputError where a point is in its middle."""
+    """The least distance [mm] of ``points`` (n, 3) to a bone at rest; InputError if a point is in its middle."""
     nearest, half = float(bone.sample(points).distance.min(initial=np.inf)), bone.half_thickness
     if nearest < -_MIDDLE * half:
         got = f"{-nearest:.3g} mm of overlap with the muscle at rest"
@@ -119,7 +120,7 @@ def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
 
 
 def check_bone(place: str, surface: Surface, shape: Obstacle, muscle: Surface, apart: float) -> None:
-    """Raise InputError for a bone that is inside the muscle, as no force would move it out, or too thin for points ``apart``."""
+    """Raise InputError for a bone inside the muscle, which no force would move out, or too thin for points ``apart``."""
     if signed_distances(surface.points, muscle).max() < 0:
         raise InputError(place, "a bone wholly inside the muscle", "one that is not")
     if not shape.half_thickness >= _THINNEST * apart:
@@ -128,7 +129,7 @@ def check_bone(place: str, surface: Surface, shape: Obstacle, muscle: Surface, a
 
 
 def check_exempt(exempt: Exemption, place: str) -> None:
-    """Raise InputError where most of the unattached surface is exempt from contact; log a warning where much of it is."""
+    """Raise InputError if most of the unattached surface is exempt from contact; log a warning if much of it is exempt."""
     got = f"attachments within {exempt.reach:.2g} mm of {100 * exempt.lost:.0f} % of the unattached surface, without contact there"
     if not exempt.lost <= _LOST:
         raise InputError(place, got, f"at most {100 * _LOST:.0f} %: larger or fewer pieces, or no effect contact")

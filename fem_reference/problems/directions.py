@@ -1,4 +1,4 @@
-"""Checks of the fibre directions of a body, and of the normals about which laws turn them."""
+"""Checks of the fibre directions of a body, and of the normals about which laws turn fibres."""
 
 import math
 
@@ -30,7 +30,7 @@ def check_unit(fibre: Directions, places: Floats) -> None:
 
 
 def check_normals(body: Body) -> None:
-    """Raise InputError where the ``normal`` of a law is along the fibres, so that no direction across both is known."""
+    """Raise InputError if the ``normal`` of a law is along the fibres, so that no direction across both is known."""
     laws = [effect for effect in body.effects if isinstance(effect, HolzapfelOgden)]
     fibre = body.fibre
     if fibre is None or not laws:

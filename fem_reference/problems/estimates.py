@@ -31,17 +31,18 @@ from fem_reference.scenes.muscle import MuscleCase
 log = logging.getLogger(__name__)
 
 # An effect that moves the surface less than this is negligible: a share of the size of the scene's tetrahedra, or of the travel of
-# the surface where that is less. Error bars of the surface, root mean square, are 0.03 to 0.14 of the former and 0.01 to 0.05 of
-# the latter; those of fibre lengths and volumes are tighter where only these change.
+# the surface if that is less. Error bars of the surface (rms) are 0.03 to 0.14 of the size and 0.01 to 0.05 of the travel; bars of
+# fibre lengths and volumes are smaller if only these change.
 TOLERANCE = 0.005
-# The negligible change of stress by an effect, relative to the stress of the other effects, and the least strain assumed for that.
+# The negligible change of stress by an effect, relative to the stress of the other effects, and the least strain assumed for that
+# stress.
 STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
-# The error of the guessed position of a point, as a share of its path past a bone. In `hip_flexion` it is 0.83.
+# The error of the guessed position of a point, as a share of its path past a bone (0.83 in `hip_flexion`).
 _DOUBT = 1.0
 # The numbers of sampled frames, evenly spread, and of sampled vertices.
 _FRAMES, _VERTICES = 9, 1500
 _PLACES = 6000  # contact points, sampled for their distance to bones
-_ALONG = 0.7  # triangles are sampled for the stretch along a direction whose share in their plane is above this
+_ALONG = 0.7  # triangles are sampled for the stretch along a direction if its share in their plane is above this
 _STILL = 1e-6  # [mm], motion that is only rounding
 _FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
 
@@ -49,8 +50,8 @@ _FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
 @dataclass(frozen=True)
 class Decision:
     """Decision on whether an effect is ``needed``, by its ``indicator`` (None for a part of the material) and the allowed values
-    ``bound`` [mm] and ``stress_bound`` [MPa]. ``turned_out``: the frame whose solution showed the need, None where the estimates
-    did; ``listed``: the effect acts in any case. ``of``: the one of several muscles in which it acts.
+    ``bound`` [mm] and ``stress_bound`` [MPa]. ``turned_out``: the frame whose solution showed the need, None if estimates showed
+    it. ``listed``: the effect acts in any case. ``of``: the muscle in which it acts, if there are several.
     """
 
     effect: Effect
@@ -91,7 +92,7 @@ class Decision:
 
     @property
     def _because(self) -> str:
-        """The quantities that decided: those above their allowed values, or all where none is."""
+        """The quantities that decided: all above their allowed values, or all quantities if none is above."""
         assert self.indicator is not None
         estimate, stress, most = self.indicator.estimate, 1e3 * self.indicator.stress, 1e3 * self.stress_bound
         said = [
@@ -173,7 +174,7 @@ def _instants(case: MuscleCase) -> tuple[float, ...]:
 
 
 def _shear(case: MuscleCase, rest: Setup) -> float:
-    """The shear modulus at rest [MPa] of the stored energies, without fibres; that of the softest place where regions differ."""
+    """The shear modulus at rest [MPa] of the stored energies, without fibres, at the softest place if regions differ."""
     stored = [one for one in case.effects if isinstance(one, Energy) and one.stored and not isinstance(one, Ramped)]
     laws = [(one, 1.0) for one in stored]
     isotropic = [(one, 1.0) for one in stored if not one.needs]
@@ -186,7 +187,7 @@ def _shear(case: MuscleCase, rest: Setup) -> float:
 
 
 def _tension(case: MuscleCase) -> float:
-    """The stress of all fibres at their rest length [MPa], averaged over the frames, without fibres that act in regions only."""
+    """The stress [MPa] of all fibres at their rest length, averaged over the frames, without fibres that act in regions only."""
     pulling = [one for one in case.effects if isinstance(one, Energy) and one.stored and "fibre" in one.needs]
     pulling = [one for one in pulling if not one.region]
     return sum(
@@ -216,7 +217,7 @@ def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
 
 def stretched(rest: Setup, positions: Floats) -> tuple[float, float]:
     """The smallest and the greatest stretch of the surface, at ``positions`` (n, 3), along the line between its attachments. A
-    hundredth of the surface's area at either extreme is left out, as that may be single triangles at a rim.
+    hundredth of the surface's area at either extreme is left out, as it may consist of single triangles at a rim.
     """
     if len(rest.attached) < 2:
         return 1.0, 1.0

@@ -1,4 +1,4 @@
-"""The ends of a muscle's fibres: the attachment to which each belongs, its distance from that, and the area that ends cover."""
+"""The ends of a muscle's fibres: the attachment to which each belongs, its distance from it, and the area that ends cover."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +13,7 @@ from fem_reference.geometry.distance import Distances, distances
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.problems.setup import AttachedVertices
 
-# The greatest distance [mm] from its attachment at which an end counts as reaching it: so near, the muscle is practically attached.
+# The greatest distance [mm] at which an end counts as reaching its attachment: the muscle there practically moves with the bone.
 REACHES = 2.0
 SIDES = ("first", "last")  # ends of a fibre
 
@@ -22,11 +22,10 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class FibreEnds:
-    """The first and the last end of k fibres: ``by`` (k, 2), the index in ``attached`` of the attachment of each, its ``distance``
-    (k, 2) [mm] from the attached area at rest, and the ``closest`` point (k, 2, 3) [mm] of that area; ``covered`` (a,): the share
-    of the area of each attachment that is within the mean spacing of fibres, sqrt(area / k), of an end that belongs to it.
-
-    A fibre whose end does not reach its attachment continues as the tendon of the attachment, where that has one.
+    """The first and the last end of k fibres. ``by`` (k, 2): the index in ``attached`` of the attachment of each end. ``distance``
+    (k, 2) [mm]: its distance from the attached area at rest; ``closest`` (k, 2, 3) [mm]: the closest point of this area.
+    ``covered`` (a,): the share of the area of each attachment within the mean spacing of fibres, sqrt(area / k), of an end that
+    belongs to it. If an end does not reach its attachment, the fibre continues as the tendon of the attachment, if there is one.
     """
 
     attached: tuple[AttachedVertices, ...]
@@ -37,7 +36,7 @@ class FibreEnds:
 
     @cached_property
     def tendons(self) -> Floats:
-        """The points (k, 2, 3) [mm] of bones at rest to which ends continue as tendons; NaN where they do not."""
+        """The points (k, 2, 3) [mm] of bones at rest to which ends continue as tendons; NaN if they do not."""
         points = np.array([np.full(3, np.nan) if one.tendon is None else one.tendon for one in self.attached])
         return np.where((self.distance > REACHES)[:, :, None], points[self.by], np.nan)
 
@@ -54,7 +53,7 @@ class FibreEnds:
         return found
 
     def off(self, ends: Floats, rest: Floats, frame: float) -> Floats:
-        """Distances (k, 2) [mm] of ``ends`` (k, 2, 3) [mm] at a ``frame`` from those at ``rest`` moved with their bones."""
+        """Distances (k, 2) [mm] of ``ends`` (k, 2, 3) [mm] at a ``frame`` from the ends at ``rest`` moved with their bones."""
         return np.asarray(np.linalg.norm(ends - self.taken(rest, frame), axis=2))
 
     def beyond(self, ends: Floats, frame: float) -> Floats:
@@ -69,8 +68,8 @@ class FibreEnds:
 
     @cached_property
     def facts(self) -> dict[str, float | str]:
-        """The numbers of all ends, of those that continue as a tendon, and of those beside their attachment, with the names of the
-        latter; and the covered share of each attachment [%].
+        """The numbers of all ends, of ends that continue as a tendon, and of ends beside their attachment, with their names; and
+        the covered share of each attachment [%].
         """
         tied = np.isfinite(self.tendons[:, :, 0])
         found: dict[str, float | str] = {
@@ -106,11 +105,11 @@ def facts_of(lines: Polylines, ends: FibreEnds | None) -> dict[str, float | str]
 
 
 def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fibres: Polylines) -> FibreEnds | None:
-    """The ends of the ``fibres`` of a muscle from its attachments and the parts that these exempt from contact; None without any.
+    """The ends of the ``fibres`` of a muscle from its attachments and their parts exempt from contact; None without attachments.
 
     A fibre runs from bone to bone: among the pairs of attachments to two bones, its ends belong to the pair with the least sum of
-    distances, so that a short fibre beside its origin does not belong to the origin twice. Where one bone has all attachments, each
-    end belongs to the nearest.
+    distances, so a short fibre beside its origin does not belong to the origin twice. If one bone has all attachments, each end
+    belongs to the nearest attachment.
     """
     if not attached:
         return None
@@ -130,7 +129,7 @@ def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fib
 
 
 def completed(lines: Polylines, ends: FibreEnds) -> Polylines:
-    """The ``lines``; those that end beside their attachment are extended straight to its closest point in steps of at most 2 mm.
+    """The ``lines``; lines that end beside their attachment are extended straight to its closest point in steps of at most 2 mm.
 
     An extension may leave the muscle; the caller moves its points back inside.
     """

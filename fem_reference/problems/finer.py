@@ -79,15 +79,15 @@ def _linear(kind: Kind, places: Floats) -> Floats:
 
 
 def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
-    """The values (q, k) of the nodes' polynomials, each 1 at its own node and 0 at all others, at ``places`` (q, 3) in the cell."""
+    """The values (q, k) of the nodes' polynomials (1 at one node and 0 at all others) at ``places`` (q, 3) in the cell."""
     powers = np.array([p for p in product(range(degree + 1), repeat=3) if kind == "hexahedron" or sum(p) <= degree])
     nodes, points = ((some[:, None, :] ** powers).prod(axis=2) for some in (reference_nodes(kind, degree), places))
     return np.asarray(np.linalg.solve(nodes.T, points.T).T)
 
 
 def _named(corners: Ints, shares: Ints) -> tuple[Ints, Ints]:
-    """The number (m, 8, k) of each node of the parts of cells with ``corners`` (m, c), and the first index of each node. Two nodes
-    are the same where the same corners have the same ``shares`` (8, k, c).
+    """The number (m, 8, k) of each node of the parts of cells with ``corners`` (m, c), and the first index of each node. Nodes with
+    equal ``shares`` (8, k, c) of the same corners are one node.
     """
     some = np.where(shares > 0, corners[:, None, None], -1)
     order = np.argsort(some, axis=-1)
@@ -98,7 +98,7 @@ def _named(corners: Ints, shares: Ints) -> tuple[Ints, Ints]:
 
 
 def _facets(mesh: Cells, names: Ints, shares: Ints) -> dict[str, Ints]:
-    """The regions on the parts: those of their facets that lie on a facet of the region."""
+    """The regions on the parts: the facets of the parts that lie on a facet of the region."""
     sides = facet_corners(mesh.kind)
     every = np.arange(shares.shape[-1])
     parts = []  # for each side, the facets (part, corners of the part) that lie on it
@@ -116,7 +116,7 @@ def _facets(mesh: Cells, names: Ints, shares: Ints) -> dict[str, Ints]:
 
 
 def _in_parts(skin: Skin, mesh: Cells) -> Skin:
-    """The skin with each point in the nearest part of its cell: of straight tetrahedra, that with the greatest least share."""
+    """The skin with each point in the nearest part of its cell; in straight tetrahedra, the part with the greatest least share."""
     corners = mesh.points[mesh.cells[skin.cells, :4]]
     places, parts = barycentric(skin.points, corners)[:, 1:], _parts("tetrahedron")
     inside = np.linalg.solve(edge_vectors(parts)[None], (places[:, None] - parts[None, :, 0])[..., None])

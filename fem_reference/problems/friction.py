@@ -1,4 +1,4 @@
-"""Coulomb's friction of points on a surface: a spring holds a point, which slides where its force would exceed the limit."""
+"""Coulomb's friction of points on a surface: a spring holds a point, which slides if the force would exceed the limit."""
 
 from collections.abc import Iterable
 from math import isfinite
@@ -11,8 +11,8 @@ from fem_reference.foundations.mesh import Floats
 
 
 def check(coefficients: Iterable[float | None], *, begun: bool) -> None:
-    """Raise InputError where a coefficient of friction is neither None nor above 0, or where a body with friction has ``begun``
-    deformed or under tension: the places to which its points stick are not known.
+    """Raise InputError if a coefficient of friction is neither None nor above 0, or if a body with friction has ``begun`` deformed
+    or under tension: the places to which its points stick are then not known.
     """
     for one in (one for one in coefficients if one is not None):
         if not (isfinite(one) and one > 0):
@@ -45,8 +45,8 @@ def returned(slip: Floats, limit: Floats, stiffness: float) -> Returned:
 
 
 def since_entry(gap: Floats, before: Floats, felt: float) -> tuple[Floats, Floats]:
-    """The share (n,) of a straight path that lies within contact, where the gap falls from ``before`` (n,) [mm], which is at least
-    ``felt`` [mm], to ``gap`` (n,), which is below; and the derivative (n,) of that share in ``gap``.
+    """The share (n,) of a straight path that lies within contact, and the derivative (n,) of this share in ``gap``. The gap
+    decreases from ``before`` (n,) [mm], at least ``felt`` [mm], to ``gap`` (n,) [mm], below ``felt``.
     """
     whole = before - gap
     return (felt - gap) / whole, (felt - before) / whole**2

@@ -15,8 +15,8 @@ from fem_reference.problems.setup import Bone, Setup
 @dataclass(frozen=True, eq=False)
 class Guess:
     """A guess of the path of ``points`` (n, 3), which follow ``bones`` with ``weights`` (n, b): the inverse distances to the
-    attachments of each bone, so that the muscle between two of them stays straight, as under tension; or, where nothing is
-    attached, the inverse distances to the bones.
+    attachments of each bone, so the muscle between two attachments stays straight, as under tension; or, if nothing is attached,
+    the inverse distances to the bones.
     """
 
     points: Floats
@@ -47,7 +47,7 @@ def distance(bone: Bone, points: Floats) -> Floats:
 
 def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float, float, float, float]:
     """The greatest speed, speed perpendicular to an ``axis`` (3,), jump of velocity, and acceleration of a guess, each the root
-    mean square over its points and per frame number. The velocity jumps where it changes much more than it usually does.
+    mean square over its points and per frame number. A jump is a change of velocity much greater than usual.
     """
     some = slice(None, None, max(1, len(guess.points) // 100))
     guess = replace(guess, points=guess.points[some], weights=guess.weights[some])
@@ -62,7 +62,7 @@ def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float,
 
 def strain(points: Floats, moved: Floats) -> float:
     """The strain of ``points`` (n, 3) at ``moved`` (n, 3): the residual of the best rigid motion (Kabsch 1976,
-    doi 10.1107/S0567739476001873), root mean square, divided by that of the distances from the middle; 1 at most.
+    doi 10.1107/S0567739476001873), root mean square, divided by the root mean square distance from the middle; 1 at most.
     """
     rest, now = points - points.mean(axis=0), moved - moved.mean(axis=0)
     left, _, right = np.linalg.svd(now.T @ rest)
@@ -90,7 +90,7 @@ def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
 
 
 def described_motion(rest: Setup) -> str:
-    """The effect of the bones' motion on the muscle, in a sentence; empty where the muscle is not attached twice."""
+    """The effect of the bones' motion on the muscle, in a sentence; empty if the muscle is not attached twice."""
     lengths = spans(rest, rest.frames)
     if not len(lengths):
         return ""
@@ -110,8 +110,9 @@ def axis_of(rest: Setup) -> Floats:
 
 
 def sag(rest: Setup, frames: list[int], travel: float) -> float:
-    """The deviation [mm] of the axis from the straight line between two attachments: the sum of that at rest in the middle third,
-    that of bending by bones that turn, and a twentieth of the travel (a sideways shift bends it into two waves, which are stiffer).
+    """The deviation [mm] of the axis from the straight line between two attachments: the sum of the deviation at rest in the middle
+    third, the deviation by turning bones, and a twentieth of the travel (a sideways shift bends the axis into two waves, which are
+    stiffer).
     """
     if len(rest.attached) < 2:
         return 0.0

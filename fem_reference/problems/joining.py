@@ -40,7 +40,7 @@ def called(piece: str, name: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class DirectionsByPiece:
-    """The fibre directions of the pieces at ``ranges`` of cells, first and one after the last; along x in pieces that have none."""
+    """The fibre directions of the pieces at ``ranges`` of cells; along x in pieces without fibre directions."""
 
     ranges: tuple[Range, ...]
     of: tuple[Directions | None, ...]
@@ -57,7 +57,7 @@ class DirectionsByPiece:
 
 @dataclass(frozen=True, eq=False)
 class Share:
-    """The share of points in a ``region``, or outside of it; 1 where no region is named."""
+    """The share of points in a ``region``, or outside of it; 1 if no region is named."""
 
     region: Region | None = None
     outside: bool = False
@@ -70,8 +70,8 @@ class Share:
 
 
 def join(bodies: Mapping[str, Body], touching: tuple[Touching, ...] = ()) -> Body:
-    """The body joined from ``bodies`` by name, with contact ``touching`` between facets of the whole. Effects that all bodies have
-    act everywhere, other effects act in the cells of their bodies. InputError where bodies differ in what must be the same.
+    """The body joined from ``bodies`` by name, with contact ``touching`` between facets of the joined body. Effects that all bodies
+    have act everywhere, other effects act in the cells of their bodies. InputError if bodies differ in what must be the same.
     """
     ends = np.cumsum([0, *(len(one.mesh.cells) for one in bodies.values())]).tolist()
     ranges = {name: (first, last) for name, first, last in zip(bodies, ends, ends[1:], strict=False)}
@@ -104,7 +104,7 @@ def join(bodies: Mapping[str, Body], touching: tuple[Touching, ...] = ()) -> Bod
 
 
 def _frames(bodies: Mapping[str, Body], touching: tuple[Touching, ...]) -> tuple[float, ...]:
-    """The frames of the bodies, from the earliest on at which the removal of an overlap at rest begins."""
+    """The frames of the bodies, from the earliest start of the removal of an overlap at rest."""
     found = min((one.frames for one in bodies.values()), key=lambda frames: frames[0])
     begin = min((law.relaxed[0] for law in touching if law.relaxed is not None), default=found[0])
     return (begin, *found) if begin < found[0] else found
@@ -141,7 +141,7 @@ def _acting(
 
 
 def _check_pressure(bodies: Mapping[str, Body]) -> None:
-    """Raise InputError where one body has an unknown, such as the pressure, that another lacks."""
+    """Raise InputError if one body has an unknown, such as the pressure, that another lacks."""
     brought = {name: {one for effect in body.effects for one in effect.unknowns} for name, body in bodies.items()}
     if len({frozenset(one) for one in brought.values()}) > 1:
         got = "; ".join(f"{name}: {', '.join(sorted(one)) or 'none'}" for name, one in brought.items())
@@ -149,7 +149,7 @@ def _check_pressure(bodies: Mapping[str, Body]) -> None:
 
 
 def _prescribed(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> Iterator[Prescribed]:
-    """All prescribed displacements, with the names that they have in the joined body."""
+    """All prescribed displacements, with their names in the joined body."""
     for name, body in bodies.items():
         for entry in body.prescribed:
             on = called(name, entry.on) if isinstance(entry.on, str) else _moved(entry.on, ranges[name][0])
@@ -162,7 +162,7 @@ def _moved(skin: Skin, first: int) -> Skin:
 
 
 def _contact(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> ContactLaw | None:
-    """The contact of all bodies with bones, on the points of all; None where there is none."""
+    """The contact of all bodies with bones, on the points of all bodies; None without contact."""
     laws: dict[str, Any] = {name: one.contact for name, one in bodies.items() if one.contact is not None}
     if not laws:
         return None

@@ -13,7 +13,9 @@ def check(body: Body) -> None:
     facets = body.mesh.facets
     exact = [entry for entry in body.prescribed if entry.stiffness is None and isinstance(entry.on, str)]
     for i, effect in enumerate(body.effects):
-        loaded = _names(facets.get(effect.on)) if isinstance(effect, Load) and exact else set()
+        if not isinstance(effect, Load):
+            continue
+        loaded = _names(facets.get(effect.on)) if exact else set()
         fixed = (
             set[tuple[int, ...]]().union(*(_names(facets.get(str(one.on))) for one in exact if axis in one.components))
             for axis in range(3)

@@ -45,13 +45,7 @@ from fem_reference.problems import regions
 from fem_reference.problems.anatomy import facets_under, fibres_of, inside, pick, tendon_of, unshifted
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.checks import check_agreement, check_thinness
-from fem_reference.problems.contact import (
-    ContactBone,
-    ContactLaw,
-    check_bone,
-    check_exempt,
-    nearest_at_rest,
-)
+from fem_reference.problems.contact import ContactBone, ContactLaw, check_bone, check_exempt, nearest_at_rest
 from fem_reference.problems.fibre_ends import attached_ends, completed, facts_of
 from fem_reference.problems.paths import Follows, From
 from fem_reference.problems.problem import AtRest
@@ -64,14 +58,14 @@ RELAXING = 10  # an overlap at rest is removed over this many frame numbers befo
 
 
 def kept_meshes() -> Path | None:
-    """The folder of stored tetrahedra, which may be deleted; None where they are made each time."""
+    """The folder of stored tetrahedra, which may be deleted; None if they are made each time."""
     return platformdirs.user_cache_path("fem_reference") / "meshes"
 
 
 @dataclass(frozen=True, eq=False)
 class MuscleProblem(Setup):
     """A set-up filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres. ``fibre``: the fibre direction
-    at any point, where an effect needs it; ``skin``: the contact surface, if there is contact; ``attached_skins``: the points of
+    at any point, if an effect needs it; ``skin``: the contact surface, if there is contact; ``attached_skins``: the points of
     springs, by attachment; ``mesh_facts``: facts on the mesh; ``seconds``: the time that meshing took.
     """
 
@@ -87,7 +81,7 @@ class MuscleProblem(Setup):
 
     @cached_property
     def directions(self) -> Floats | None:
-        """Unit vectors (k, 3) along the fibres at the middle of each tet, where an effect needs them."""
+        """Unit vectors (k, 3) along the fibres at the middle of each tet, if an effect needs them."""
         middles = self.mesh.points[self.mesh.tets].mean(axis=1)
         return None if self.fibre is None else self.fibre(np.arange(len(middles)), middles)
 
@@ -104,8 +98,8 @@ class MuscleProblem(Setup):
     @cached_property
     def body(self) -> Body:
         """The finite element body of the muscle. Its bones prescribe the motion of exactly attached facets, or pull by
-        springs at ``attached_skins``; the rest of its surface is ``"free"``, with contact on ``skin``. InputError where
-        two bones prescribe different motions, or one moves in a way that cannot be followed.
+        springs at ``attached_skins``; the rest of its surface is ``"free"``, with contact on ``skin``. InputError if two bones
+        prescribe different motions, or a motion cannot be followed.
         """
         mesh, first = self.mesh, self.frames[0]
         check_thinness(mesh)
@@ -129,7 +123,7 @@ class MuscleProblem(Setup):
 
     @property
     def contact(self) -> ContactEffect | None:
-        """The effect of contact, None where there is none."""
+        """The effect of contact, None if there is none."""
         return among(self.effects)
 
     @property
@@ -156,7 +150,7 @@ def setup(case: MuscleCase) -> Setup:
 
 
 def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
-    """The whole problem of a case: its setup ``rest``, filled with tetrahedra and fibres."""
+    """The full problem of a case: its set-up ``rest``, filled with tetrahedra and fibres."""
     begin, contact = time.perf_counter(), among(case.effects)
     distances_known = {} if contact is None else _distances(case, rest, contact)
     mesh = filled(case, rest, case.muscle.tet_size)
@@ -196,7 +190,7 @@ def assembled(
 
 
 def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[str, float | str]:
-    """Spacing and errors [mm] of bones' distance grids; InputError where bones and surface do not allow contact."""
+    """Spacing and errors [mm] of bones' distance grids; InputError if bones and surface do not allow contact."""
     for i, bone in enumerate(rest.bones):
         if contact.is_by(bone.name):
             place = join(case.place, f"bone[{i}]")
@@ -211,7 +205,7 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 
 
 def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
-    """Tetrahedra of a ``size`` [mm] with the facets of attachments: within their rims where the mesher keeps these, else below."""
+    """Tetrahedra of a ``size`` [mm] with the facets of attachments: within the rims if the mesher keeps these, else below."""
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
     mesh = block.fill(rest.surface, size) if case.muscle.mesher == "block" else filled(rest.surface, size)
@@ -256,14 +250,14 @@ def _attached(case: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tu
 
 
 def solid(bone: CaseBone) -> Obstacle | None:
-    """The obstacle of a ``bone`` with a closed form; None where the bone is a surface in a file."""
+    """The obstacle of a ``bone`` with a closed form; None if the bone is a surface in a file."""
     given = ((name, getattr(bone, name)) for name in CLOSED_FORMS)
     return next((CLOSED_FORMS[name](**form.model_dump()) for name, form in given if form is not None), None)
 
 
 def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:
     """Mesher, size and quality of the mesh; and for each attachment its area on the surface and on the tets, and the number of its
-    vertices that are more than ``far`` [mm] from attached facets: islands that the tets do not resolve.
+    vertices farther than ``far`` [mm] from attached facets: islands that the tets do not resolve.
     """
     qualities = tet_qualities(mesh.points, mesh.tets)
     facts: dict[str, float | str] = {

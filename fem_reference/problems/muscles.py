@@ -1,4 +1,4 @@
-"""Several muscles of one scene: each with its own set-up and problem, and all together as one body with contact between them."""
+"""Several muscles of one scene: a set-up and a problem for each, and all together as one body with contact between them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -67,7 +67,7 @@ class MusclesSetup:
 @dataclass(frozen=True, eq=False)
 class MusclesProblem:
     """The ``problems`` of several muscles by name, solved as one body, with contact of a ``law`` between the ``pairs``, if any.
-    ``apart``: True where muscles must not cross: contact acts between them, or was left out as they stay apart.
+    ``apart``: True if muscles must not cross, because contact acts between them or was left out as they stay apart.
     """
 
     problems: dict[str, MuscleProblem]
@@ -130,7 +130,7 @@ class MusclesProblem:
 
     @cached_property
     def body(self) -> Body:
-        """The finite element body of all muscles, with contact between the free surfaces of those that may touch."""
+        """The finite element body of all muscles, with contact between the free surfaces of muscles that may touch."""
         bodies, law, first = {name: one.body for name, one in self.problems.items()}, self.law, self.frames[0]
         touching, relaxed = list[Touching](), (first - RELAXING, first)
         for one, other in self.pairs:
@@ -141,7 +141,7 @@ class MusclesProblem:
         return join(bodies, tuple(touching))
 
     def _near_at_rest(self, one: str, other: str) -> bool:
-        """True where the tetrahedra of two muscles overlap at rest, or are so near that they press each other."""
+        """True if the tetrahedra of two muscles overlap at rest, or are so near that they press each other."""
         assert self.law is not None  # called with contact only
         skins = [skin_of(self.problems[name].mesh) for name in (one, other)]
         return _apart(*skins) < self.law.smoothing
@@ -194,7 +194,7 @@ def build(case: MusclesCase, rest: MusclesSetup) -> MusclesProblem:
 
 def _gaps(case: MusclesCase, muscles: Mapping[str, Setup], felt: float) -> dict[tuple[str, str], float]:
     """A lower bound [mm] of the distance between each two muscles over all frames. It allows for bulging, the pressure of bones and
-    loads, unless the motion of the bones alone may bring the two within ``felt`` [mm].
+    loads, unless the motion of the bones alone may bring two muscles within ``felt`` [mm].
     """
     parts, found = dict(zip(muscles, case.parts, strict=True)), dict[tuple[str, str], float]()
     beyond = cache(lambda name: _beyond(parts[name], muscles[name]))
@@ -205,8 +205,8 @@ def _gaps(case: MusclesCase, muscles: Mapping[str, Setup], felt: float) -> dict[
 
 
 def _beyond(case: MuscleCase, rest: Setup) -> float:
-    """The distance [mm] by which a muscle may deviate from the motion of its bones: it bulges where it shortens at constant volume,
-    bones in contact displace it by their penetration, and external loads move it by its length at most.
+    """The distance [mm] by which a muscle may deviate from the motion of its bones: it bulges as it shortens at constant volume,
+    bones in contact displace it by their penetration, and external loads move it by at most its length.
     """
     if any(one.outer for one in case.effects):
         return length_of(rest)
@@ -218,14 +218,14 @@ def _beyond(case: MuscleCase, rest: Setup) -> float:
 
 def clearance(one: Setup, other: Setup) -> float:
     """A lower bound [mm] of the distance, over all frames, between two muscles that only follow the bones: the distance at rest
-    less the greatest displacement of each with a bone. It is below 0 where they may cross.
+    less the greatest displacement of each with a bone; below 0 if they may cross.
     """
     between = max(spacing(one.surface), spacing(other.surface))  # their distances are between vertices
     return _apart(one.surface, other.surface) - between - _travel(one) - _travel(other)
 
 
 def _apart(one: Surface, other: Surface) -> float:
-    """The distance [mm] between two surfaces, from the vertices of each; 0 where they cross."""
+    """The distance [mm] between two surfaces, from the vertices of each; 0 if they cross."""
     if len(crossings(one, other)):
         return 0.0
     found = [distances(a.points, b).distance.min() for a, b in ((one, other), (other, one))]
@@ -251,7 +251,9 @@ def _instants(bone: Bone, frames: Sequence[int]) -> Floats:
 
 
 def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
-    """Decisions on each effect: one of all muscles is needed if any muscle needs it, contact between them if they come near."""
+    """Decisions on each effect: an effect on all muscles is needed if any of them needs it, contact if muscles come near each
+    other.
+    """
     found = [decisions(part, one) for part, one in zip(case.parts, rest.muscles.values(), strict=True)]
     every: list[Decision] = []
     for effect in case.effects:
@@ -276,7 +278,7 @@ def _touches(case: MusclesCase, rest: MusclesSetup, effect: MuscleContact) -> De
 
 
 def needed(case: MusclesCase, found: tuple[Decision, ...]) -> MusclesCase:
-    """The case with the needed effects, both those of all muscles and those of each."""
+    """The case with the needed effects, on all muscles and on each muscle."""
     kept: list[Any] = [one.effect for one in found if one.needed]
     own = tuple(
         one.model_copy(

@@ -39,7 +39,7 @@ def mechanical(built: CaseProblem) -> MechanicalProblem | None:
 
 
 def effects_of(built: MechanicalProblem) -> tuple[Effect, ...]:
-    """The effects of one muscle, or of all and between them."""
+    """The effects of one muscle, or of all muscles and between them."""
     if isinstance(built, MuscleProblem):
         return built.effects
     found = tuple(effect for one in built.problems.values() for effect in one.effects)
@@ -54,7 +54,9 @@ def at_frames(built: MechanicalProblem, frames: tuple[int, ...]) -> MechanicalPr
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
-    """Decisions on the effects that a case needs, with reasons, from the set-up by ``rest`` or a new one; empty for a field."""
+    """Decisions on the effects that a case needs, with reasons, from the set-up made by ``rest`` or a new set-up; empty for a
+    field.
+    """
     if not isinstance(case, MuscleCase | MusclesCase):
         return ()
     known = setup(case) if rest is None else rest()
@@ -154,7 +156,7 @@ def known(case: Case, setup: CaseSetup) -> dict[str, object]:
 
 
 def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
-    """The case with the effects that it needs, where it leaves them to be determined, by the decisions that ``explained`` gives."""
+    """The case with the effects that it needs, by the decisions of ``explained`` if the case does not determine them."""
     if not isinstance(case, MuscleCase | MusclesCase) or case.choice == "listed":
         return case
     found = explained(case, rest)
@@ -167,7 +169,7 @@ def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
 
 
 def watch(case: Case, rest: CaseSetup, built: Callable[[], CaseProblem]) -> Watch | None:
-    """The watch for effects that a case omitted, from its set-up and its problem; None where the case omitted none."""
+    """The watch for effects that a case omitted, from its set-up and its problem; None if the case omitted none."""
     if not isinstance(case, MuscleCase) or all(one.needed for one in case.decisions):
         return None
     assert isinstance(rest, Setup)  # of a muscle
@@ -185,7 +187,7 @@ def with_effects[C: Case](case: C, found: tuple[Decision, ...]) -> C:
 
 
 def scalar_case(case: Case) -> ScalarCase:
-    """The ``case`` itself where it has a scalar field; else InputError."""
+    """The ``case`` itself if it has a scalar field; else InputError."""
     if not isinstance(case, ScalarCase):
         raise InputError(case.place, f'"{case.name}", the case of a muscle', "a scalar case")
     return case

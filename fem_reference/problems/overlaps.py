@@ -1,4 +1,4 @@
-"""Parts of the surface of a body that may touch: their overlap at the start, which the search for contact sees only if it is
+"""Parts of the surface of a body that may touch: their overlap at the start, which the search for contact finds only if it is
 shallow, and the skin beyond their rims.
 """
 
@@ -25,8 +25,9 @@ def overlap(body: Body, law: Touching) -> float:
 
 def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
     """A lower bound of the depth [mm] to which the parts of a ``law`` overlap with the mesh at ``points`` (n, 3) [mm]: the greatest
-    depth of a corner of either part below the skin of the other's piece, and of facets that cross; for a part with itself, of the
-    middle of a facet within the whole skin, and of facets that cross it. Curved facets count by corners, less their bulge.
+    depth of a corner of either part below the skin of the piece of the other part, and of facets that cross. For a part with
+    itself: of the middle of a facet within the entire skin, and of facets that cross the skin. Curved facets count by corners, less
+    their bulge.
     """
     one, other = mesh.facets[law.one], mesh.facets[law.other]
     owner, facets, triangles = _skin(mesh, points)
@@ -50,7 +51,7 @@ def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
 
 def through_itself(now: Surface, rest: Surface) -> tuple[float, Floats]:
     """A lower bound of the depth [mm] of self-penetration of a surface ``now``, and its place (3,), away from vertices with any at
-    ``rest``. Triangles that cross show less than a side that is within another, which counts too if there is none at rest.
+    ``rest``. Crossing triangles show less depth than a side within another side, which counts too if there is none at rest.
     """
     known = _crossing(rest) if len(pairs := self_crossings(now)) else ()
     new = pairs[~np.isin(now.triangles[pairs], known).any(axis=(1, 2))]
@@ -69,14 +70,16 @@ def _crossing(surface: Surface) -> Ints:
 
 
 def longest_edge(mesh: Cells, law: Touching) -> float:
-    """The length [mm] of the longest edge at rest of facets of a ``law``: contact points are at most a quarter of that apart."""
+    """The length [mm] of the longest edge at rest of facets of a ``law``: contact points are at most a quarter of this length
+    apart.
+    """
     corners = (mesh.points[mesh.facets[name]] for name in (law.one, law.other))
     return max(float(edge_lengths(one).max()) for one in corners)
 
 
 def beyond_rim(body: Body, side: str, other: str) -> Ints:
     """The facets (f, 3 or 4) of the skin around the part ``other``, on the same piece, which the part ``side`` may not touch; none
-    where a part touches itself.
+    if a part touches itself.
     """
     mesh, facets = body.mesh, outer_facets(body.mesh)[0]
     laws = [(law.one, law.other) for law in body.touching]
@@ -92,7 +95,7 @@ def _pieces(mesh: Cells) -> Ints:
 
 
 def _among(facets: Ints, part: Ints) -> NDArray[np.bool_]:
-    """True (f,) for those of the ``facets`` with the corners of one of ``part``, in any order."""
+    """True (f,) for each of the ``facets`` with the corners of a facet of ``part``, in any order."""
     own = set(map(tuple, np.sort(part, axis=1).tolist()))
     return np.array([tuple(key) in own for key in np.sort(facets, axis=1).tolist()], bool)
 

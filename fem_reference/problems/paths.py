@@ -61,7 +61,7 @@ def radially(
 @dataclass(frozen=True)
 class Turn:
     """A rotation by ``angle`` [rad] times the amount at the frame, about ``axis`` through ``centre`` [mm]; with ``per_length`` the
-    angle is that per mm along the axis from the centre, as in a twist.
+    angle is an angle per mm along the axis from the centre, as in a twist.
     """
 
     axis: tuple[float, float, float]
@@ -78,7 +78,7 @@ class Turn:
         return np.asarray(turned - arms)
 
     def turning(self, points: Floats) -> Turning:
-        """The knots, and the angles at these of the point that turns most."""
+        """The knots, and there the angles of the point that turns most."""
         _, _, along = self._arms(points)
         most = abs(self.angle) * float(np.abs(along).max(initial=0.0))
         return tuple(frame for frame, _ in self.knots), tuple(most * much for _, much in self.knots)

@@ -16,7 +16,7 @@ NO_SURFACE = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
 
 @dataclass(frozen=True, eq=False)
 class AtRest:
-    """Rest shapes that the frames of a run move, where they exist: the ``surface``, the ``fibres``, the tetrahedra of ``mesh``
+    """Rest shapes that the frames of a run move, if they exist: the ``surface``, the ``fibres``, the tetrahedra of ``mesh``
     and the unit vector along the fibres in each of them, ``directions`` (m, 3).
     """
 
@@ -36,7 +36,7 @@ class Problem(Protocol):
 
     @property
     def frames(self) -> Sequence[float]:
-        """The requested frame numbers; at the first the problem is at rest, unless it states otherwise."""
+        """The requested frame numbers; at the first frame the problem is at rest, unless it states otherwise."""
 
     @property
     def rest(self) -> AtRest:

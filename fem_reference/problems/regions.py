@@ -20,7 +20,7 @@ from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 
 _LEAST = 0.5  # the least sum of the shares of all laws of a kind at a point
-# The least accepted value of the greatest share in a region, which is low where the width exceeds the depth.
+# The least accepted value of the greatest share in a region, which is low if the width exceeds the depth.
 _REACHED = 0.25
 _ROUNDED = 1e-6  # the rounding error of a sum of shares
 _SURE = 0.99  # a greatest share in a region is reported if it is below this
@@ -77,7 +77,7 @@ def facts(rest: Setup) -> dict[str, str]:
 
 
 def check(body: Body) -> None:
-    """Raise InputError where an effect acts in a region that does not exist or has no points, shares are not from 0 to 1, or a part
+    """Raise InputError if an effect acts in a region that does not exist or has no points, shares are not from 0 to 1, or a part
     of the body lacks an isochoric law, a volumetric law, or a law for the pressure unknown.
     """
     named = {i: region for i, effect in enumerate(body.effects) if (region := region_of(effect))}
@@ -110,7 +110,7 @@ def check(body: Body) -> None:
 
 
 def _check_whole(kind: str, laws: list[Energy], at: State, points: Floats) -> None:
-    """Raise InputError where ``laws`` of a ``kind``, if any, do not cover ``points`` (n, 3); those of pressure must sum to 1."""
+    """Raise InputError if ``laws`` of a ``kind``, if any, do not cover ``points`` (n, 3); those of pressure must sum to 1."""
     total = np.zeros(len(points)) + sum(at.share(law.region) for law in laws)
     off = np.abs(total - 1) - _ROUNDED if kind == "pressure" else _LEAST - total
     if laws and not off.max() <= 0:

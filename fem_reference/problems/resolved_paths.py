@@ -1,12 +1,12 @@
 """Frame numbers at which load steps end, so that no step skips motion, for any frames.
 
 Between two stops no bone and no prescribed region turns by more than a right angle (from half a turn on, the straight line between
-two poses loses the sense of rotation), moves farther than the size of the body, apart from the motion that all share, or moves
-there and back by more than both a fifteenth of its distance and a hundredth of the body's size.
+two poses loses the sense of rotation), moves farther than the size of the body (without the motion common to all), or moves out and
+back by more than both a fifteenth of its distance and a hundredth of the body's size.
 
-Motions and paths of this package state the frames at which they bend and the angles by which they turn between (``turning``), so
-that this holds for all of them. Any other function of a frame number is sampled 1024 times over all frames, at least 16 times
-between two of them, and more often where it moves far: faster motion is not seen.
+Motions and paths of this package state the frames at which they bend and the angles by which they turn in between (``turning``), so
+this holds for all of them. Any other function of a frame number is sampled 1024 times over all frames, at least 16 times between
+two frames, and more often where it moves far: faster motion is not detected.
 """
 
 from collections.abc import Callable, Sequence
@@ -47,8 +47,8 @@ class Moving:
 
 
 def turning(path: object, points: Floats) -> Turning | None:
-    """The frames between which a ``path`` of ``points`` (p, 3) is steady, straight or about an axis, and the angle [rad] that it
-    has turned by at each; None where the path does not state them.
+    """The frames between which a ``path`` of ``points`` (p, 3) is steady (straight or about an axis), and the angle [rad] turned at
+    each of them; None if the path does not state them.
     """
     owner = getattr(path, "__self__", path)  # the object of a method
     if not type(owner).__module__.startswith("fem_reference."):
@@ -59,7 +59,7 @@ def turning(path: object, points: Floats) -> Turning | None:
 
 
 def moving_ramp(effect: Effect, size: float) -> Moving | None:
-    """The amount of an ``effect`` as the motion of a point, by ``size`` [mm] for the full amount; None where it is constant."""
+    """The amount of an ``effect`` as the motion of a point, by ``size`` [mm] for the full amount; None if it is constant."""
     if type(effect).amount is Effect.amount:
         return None
     knots = effect.ramp if isinstance(effect, Ramped) and type(effect).amount is Ramped.amount else None
@@ -77,7 +77,7 @@ def some(points: Floats) -> Floats:
 
 def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tuple[float, ...]:
     """Frame numbers between the first and the last of ``frames`` at which a load step ends, for a body of a ``size`` [mm];
-    InputError where anything jumps, is not finite, or moves without end.
+    InputError if anything jumps, is not finite, or moves without end.
     """
     if len(frames) < 2 or not things:
         return ()
@@ -92,7 +92,7 @@ def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tup
 
 
 def skipped(things: Sequence[Moving], frames: Sequence[float], size: float) -> tuple[Moving, float, float] | None:
-    """The thing that moves more from one of ``frames`` to the next than a step may, and these two frames; None if none does."""
+    """The thing that moves more than allowed from one of ``frames`` to the next, and these two frames; None if nothing does."""
     looked = _Samples(things, np.unique(np.concatenate([frames, *(_grid(thing, frames) for thing in things)])), size)
     for early, late in pairwise(np.searchsorted(looked.frames, frames).tolist()):
         for i, thing in enumerate(things):
@@ -144,7 +144,7 @@ class _Samples:
             )
 
     def wide(self) -> Floats:
-        """The middles of intervals in which anything goes too far to be resolved; InputError where it jumps."""
+        """The middles of intervals in which anything moves too far to be resolved; InputError if it jumps."""
         spans, found = np.diff(self.frames), np.zeros(len(self.frames) - 1, bool)
         short = ~(spans > _SHORTEST * (self.frames[-1] - self.frames[0]))
         for apart, angles in zip(self.apart, self.angles, strict=True):
@@ -179,7 +179,7 @@ class _Samples:
 
 
 def _places(thing: Moving, frames: Floats) -> Floats:
-    """The points of a thing at ``frames``, (m, p, 3) [mm]; InputError where they are not finite."""
+    """The points of a thing at ``frames``, (m, p, 3) [mm]; InputError if they are not finite."""
     found = np.array([thing.at(float(frame)) for frame in frames], float)
     lost = np.flatnonzero(~np.isfinite(found).all(axis=(1, 2)))
     if len(lost):

@@ -33,8 +33,8 @@ class Flux:
 @dataclass(frozen=True, eq=False)
 class FieldProblem:
     """A scalar field to be solved: ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node (the vertices, then
-    for order 2 the middles of ``mesh.edges``), NaN where it is free; ``upper`` (m,) the share of each cell above the mean y;
-    ``tau`` (m,) of the stabilised form, None for the plain one; ``peclet`` the mesh Peclet number; ``exact`` the known solution.
+    for order 2 the middles of ``mesh.edges``), NaN if it is free; ``upper`` (m,) the share of each cell above the mean y;
+    ``tau`` (m,) of the stabilised form, None for the plain form; ``peclet`` the mesh Peclet number; ``exact`` the known solution.
     """
 
     mesh: FieldMesh
@@ -69,7 +69,7 @@ class FieldProblem:
 
     @property
     def form(self) -> str:
-        """The weak form: galerkin, or supg where it is stabilised."""
+        """The weak form: galerkin, or supg if it is stabilised."""
         return "galerkin" if self.tau is None else "supg"
 
     @property
@@ -84,7 +84,7 @@ class FieldProblem:
 
     @property
     def advection(self) -> Advection | None:
-        """The advection, None where nothing flows."""
+        """The advection, None if nothing flows."""
         return next((effect for effect in self.effects if isinstance(effect, Advection)), None)
 
 
@@ -158,7 +158,7 @@ def at(formula: str, points: Floats) -> Floats:
 
 
 def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
-    """The values (n,) at vertices that files of bounds prescribe, NaN where there is none."""
+    """The values (n,) at vertices that files of bounds prescribe, NaN without a value."""
     values = np.full(len(mesh.points), np.nan)
     for i, entry in enumerate(case.boundary):
         if entry.bounds is not None:
@@ -179,7 +179,7 @@ def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
 
 
 def _between(mesh: FieldMesh, values: Floats) -> Floats:
-    """The values (e,) at the middles of edges: the mean of the values of both ends on the rim where both have one, else NaN."""
+    """The values (e,) at the middles of edges: on the rim the mean of the values of both ends if both have a value, else NaN."""
     edges = mesh.edges
     middles = np.full(len(edges), np.nan)
     if mesh.cells.shape[1] == 3:
@@ -189,7 +189,7 @@ def _between(mesh: FieldMesh, values: Floats) -> Floats:
 
 
 def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
-    """The value at each node, NaN where it is free; InputError where two conditions disagree on a node."""
+    """The value at each node, NaN if it is free; InputError if two conditions disagree on a node."""
     fixed = np.array(given) if case.element.order == 1 else np.concatenate([given, _between(mesh, given)])
     nodes, sloped = mesh.nodes[case.element.order], np.empty(0, np.int64)
     for i, entry in enumerate(case.boundary):
@@ -231,7 +231,7 @@ def _facets(entry: Boundary, mesh: FieldMesh) -> Ints:
 
 
 def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
-    """The nodes on facets: their vertices, and for order 2 the middles of those that are edges."""
+    """The nodes on facets: their vertices, and for order 2 the middles of facets that are edges."""
     vertices = np.unique(facets)
     if order == 1 or facets.shape[1] == 1:
         return vertices
@@ -292,7 +292,7 @@ def numbers(path: Path) -> Floats:
 
 
 def whole_numbers(path: Path, values: Floats) -> Ints:
-    """``values`` of a file as numbers of vertices; InputError where they are not whole numbers."""
+    """``values`` of a file as numbers of vertices; InputError if they are not whole numbers."""
     wrong = (values != np.round(values)) | (np.abs(values) > np.iinfo(np.int32).max)
     if wrong.any():
         raise InputError(str(path), f"the vertex {values[wrong][0]:g}", "vertices, numbered from 1")

@@ -25,7 +25,7 @@ from fem_reference.scenes.muscle import MuscleCase, Vector
 
 # Distances to a bone are computed up to this far [mm] from it.
 DISTANCE_MARGIN = 12.0
-# The greatest angle [rad] and distance [mm] between the axis of a joint and that of its bone's rotation.
+# The greatest angle [rad] and distance [mm] between the axis of a joint and the axis of its bone's rotation.
 _SAME_DIRECTION, _SAME_LINE = 1e-6, 1e-3
 
 
@@ -36,8 +36,8 @@ def kept_distances() -> Path:
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, the allowed error and the Gaussian rounding of
-    its distance [mm], as in ``CaseBone``, and its closed form ``solid``, if any, on which the vertices of the surface lie.
+    """A rigid bone: its ``surface`` at rest; its ``motion``, None if it rests; the allowed error and the Gaussian rounding of its
+    distance [mm], as in ``CaseBone``; and its closed form ``solid``, if any, on which the vertices of the surface lie.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Bone:
 
     @cached_property
     def shape(self) -> Obstacle:
-        """The signed distance to the surface, in the bone's rest frame; InputError where the surface of a file is not closed."""
+        """The signed distance to the surface, in the bone's rest frame; InputError if the surface of a file is not closed."""
         named = replace(self.surface, place=f'bone "{self.name}": {self.surface.place}')
         error, rounding = self.distance_error, self.distance_rounding
         return self.solid or cached(named, error, DISTANCE_MARGIN, rounding, kept_distances())
@@ -84,7 +84,7 @@ class Joint:
 @dataclass(frozen=True, eq=False)
 class AttachedVertices:
     """The ``vertices`` (k,) of the surface attached to ``bone``, exactly or by springs of ``stiffness`` [MPa/mm]; ``tendon`` (3,)
-    [mm]: the point of the bone at rest to which fibres that end beside these vertices continue, if any.
+    [mm]: the point of the bone at rest to which fibres with ends beside these vertices continue, if any.
     """
 
     attachment: str
@@ -96,9 +96,9 @@ class AttachedVertices:
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """The set-up of a muscle, which is all that a surface solver needs: its ``surface`` at rest, the bones, the attached vertices,
-    and the requested frames; ``interval`` [s] from a frame number to the next, if the case states it; ``start``, a function from
-    rest positions (n, 3) to those of the first frame, where these differ; ``joints``, about whose axes bones turn; ``regions`` by
+    """The set-up of a muscle, as needed by a surface solver: its ``surface`` at rest, the bones, the attached vertices, and the
+    requested frames. ``interval`` [s]: the time from a frame number to the next, if the case states it. ``start``: a function from
+    rest positions (n, 3) to positions in the first frame, if they differ. ``joints``: bones turn about their axes. ``regions``: by
     name, in which effects act.
     """
 
@@ -147,9 +147,9 @@ class Setup:
 
 
 def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
-    """The joints of a case; where it names none, one for each bone that rotates, with the bone's name and the axis of its motion.
+    """The joints of a case; without any, a joint for each bone that rotates, with the bone's name and the axis of its motion.
 
-    InputError where a bone does not rotate about the axis of its joint, as the joint would have no angle.
+    InputError if a bone does not rotate about the axis of its joint, as the joint would have no angle.
     """
     if not case.joint:
         moving = ((bone, bone.motion) for bone in bones if bone.motion is not None)
@@ -169,7 +169,7 @@ def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
 
 
 def _joint(name: str, bone: Bone, motion: RigidMotion, axis: Vector, centre: Vector) -> Joint:
-    """The joint of a bone; an ``axis`` against that of its ``motion`` counts the angle the other way."""
+    """The joint of a bone; an ``axis`` opposite to the axis of its ``motion`` reverses the sign of the angle."""
     unit, sign = np.array(axis) / np.linalg.norm(axis), float(np.sign(np.dot(axis, motion.axis)))
     return Joint(name, bone, unit, np.array(centre), partial(_angle, motion, sign))
 

@@ -21,20 +21,20 @@ Counts = tuple[int, int, int]
 
 # Nodes nearer than this share of the body's size are one node.
 _SAME = 1e-9
-# The bulge of the sides of the square in a disc, with which three blocks meet at its corners at 120 degrees each.
+# The bulge of the sides of the square in a disc for which three blocks meet at its corners at 120 degrees each.
 _BULGE = np.tan(np.pi / 12) / 2
 # Half the square's side over the radius of its disc.
 _SQUARE_IN_CYLINDER = 0.45
 _SQUARE_IN_VENTRICLE = 0.22
 # The ventricle of Land et al. 2015 (doi 10.1098/rspa.2015.0641): semi-axes inside, wall thickness, and z of its base [mm].
 _SHORT, _LONG, _WALL, _BASE = 7.0, 17.0, 3.0, 5.0
-# The relative excess of the slope of the angle at the apex over its mean, with which arc length grows evenly.
+# The relative excess of the slope of the angle at the apex over its mean for which arc length grows evenly.
 _APEX = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Brick:
-    """A part of a body: ``place`` takes points (n, 3) of the unit cube smoothly to points (n, 3) [mm], ``counts`` are the numbers
+    """A part of a body: ``place`` maps points (n, 3) of the unit cube smoothly to points (n, 3) [mm], ``counts`` are the numbers
     of cells along its axes, and ``faces`` maps a face of the cube, x0 to z1, to its region of the surface.
 
     Where two blocks meet, the axes along their common face have the same directions, so that the tetrahedra match.
@@ -76,7 +76,7 @@ def _lattice(counts: Counts, kind: Kind, degree: int) -> Ints:
 
 
 def _merged(points: Floats) -> tuple[Floats, Ints]:
-    """The distinct points (n, 3) among ``points``, and the number of each of ``points`` among these."""
+    """The distinct points (n, 3) among ``points``, and for each of ``points`` its number among them."""
     tolerance = _SAME * float(np.ptp(points, axis=0).max())
     first, second = cKDTree(points).query_pairs(tolerance, output_type="ndarray").T
     name = connected_parts(first, second, len(points))
@@ -92,7 +92,7 @@ def _facets(cells: Ints, lattice: Ints, grid: tuple[int, ...], face: str, kind: 
 
 
 def _upright(points: Floats, cells: Ints, kind: Kind, degree: int) -> Ints:
-    """The ``cells``, of which those of negative volume are mirrored: the first two axes of their reference cell are exchanged."""
+    """The ``cells``, mirrored if their volume is negative: the first two axes of their reference cell are exchanged."""
     corners = points[cells[:, [0, 1, 2, 3 if kind == "tetrahedron" else 4]]]
     wrong = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
     nodes = reference_nodes(kind, degree)
@@ -114,7 +114,7 @@ def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: in
 
 
 def joined(pieces: Mapping[str, Cells]) -> Cells:
-    """The mesh of separate ``pieces`` of one kind and degree; a region's name follows that of its piece: ``left_x1``."""
+    """The mesh of separate ``pieces`` of one kind and degree; the name of a region follows the name of its piece: ``left_x1``."""
     meshes, kinds = pieces.values(), {(piece.kind, piece.degree) for piece in pieces.values()}
     if len(kinds) != 1:
         raise InputError("pieces", f"{len(kinds)} kinds and degrees of cells", "one")
@@ -129,7 +129,7 @@ def joined(pieces: Mapping[str, Cells]) -> Cells:
 def warped_box(
     counts: Counts, size: tuple[float, float, float], kind: Kind, degree: int = 1, bump: float = 0.1
 ) -> Cells:
-    """A :func:`box` whose inner nodes are moved, by up to ``bump`` of its size: its faces stay where they are.
+    """A :func:`box` whose inner nodes are moved, by up to ``bump`` of its size: its faces do not move.
 
     From 0.15 on cells may be inverted: first curved tetrahedra, where there is only one cell along an axis.
     """
@@ -270,7 +270,7 @@ def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degr
     """The octant x, y, z >= 0 of a ball of radius ``outer`` [mm].
 
     It has a cube with ``n`` cells along each side, of length ``core`` [mm], at its centre, and around it ``layers`` of cells that
-    grow evenly from those of the cube to the sphere. Faces: outer, x0, y0, z0.
+    grow evenly from the cube to the sphere. Faces: outer, x0, y0, z0.
     """
     size, far = core / n, outer - core
     growth = scipy.optimize.brentq(lambda q: size * (q**layers - 1) / (q - 1) - far, 1 + 1e-9, 1 + far / size)

@@ -1,4 +1,4 @@
-"""Stresses in solved states by the energies of effects, independently of any solver; also of effects that were left out."""
+"""Stresses in solved states by the energies of effects, independently of any solver; including effects that were left out."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ Acting = Sequence[tuple[Effect, float]]
 Shares = Mapping[str, Floats]
 NONE: Shares = MappingProxyType({})
 
-# The greatest number of sampled tetrahedra, evenly spread, and of places evaluated at once, so that their jets fit in a cache.
+# The greatest number of sampled tetrahedra, evenly spread, and of places evaluated at once, so that their jets fit into a cache.
 _MOST, AT_ONCE = 2048, 1024
 _SMALLEST = 0.05  # the least det F of sampled tetrahedra: curved ones may be inverted between their corners
 
@@ -55,9 +55,9 @@ def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None, shares: Shares = 
 
 @dataclass(frozen=True)
 class StressSizes:
-    """Sizes of stresses [MPa] in a state, root mean square over the volume: that of the acting effects without pressure (``acts``),
-    and that of the change by each other effect (``added``); and the smallest and the greatest ``stretch`` of fibres. NaN where no
-    tetrahedron has a positive volume.
+    """Sizes of stresses [MPa] in a state, root mean square over the volume. ``acts``: the stress of the acting effects without
+    pressure; ``added``: the change of stress by each other effect. ``stretch``: the least and the greatest stretch of fibres. NaN
+    if no tetrahedron has a positive volume.
     """
 
     acts: float
@@ -96,7 +96,9 @@ class StressSamples:
 
 
 def _added(acting: Acting, one: tuple[Effect, float], now: Floats, stress: Callable[[Acting], Floats]) -> Floats:
-    """The change of the stress ``now`` (n, 3, 3) by an effect: for an energy, its own stress with the prestrains of ``acting``."""
+    """The change of the stress ``now`` (n, 3, 3) by an effect: for an energy, the stress of this energy with the prestrains of
+    ``acting``.
+    """
     if isinstance(one[0], Energy):
         return stress([*(other for other in acting if isinstance(other[0], Prestrain)), one])
     return stress([*acting, one]) - now if isinstance(one[0], Prestrain) else np.zeros(now.shape)
@@ -117,11 +119,10 @@ def _mean(stress: Floats, volumes: Floats) -> float:
 
 
 class Watch:
-    """The influence, on frames that are solved one after the other, of effects that a ``case`` left out. ``frames``: the surface
-    (n, 3) of each, and the stresses in its tetrahedra, if any.
-
-    The stress of an omitted effect follows from a state without another solution, as does that of the effects that act. During a
-    run, the latter is the ``known`` estimate or, if greater, the stress found so far; at the end, it is the greatest found.
+    """The influence, on successively solved frames, of effects that a ``case`` left out. ``frames``: the surface (n, 3) of each,
+    and the stresses in its tetrahedra, if any. The stresses of omitted and of acting effects follow from a state without another
+    solution. During a run, the stress of the acting effects is the ``known`` estimate or, if greater, the stress found so far; at
+    the end, it is the greatest stress found.
     """
 
     def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:
@@ -143,14 +144,14 @@ class Watch:
         return [repr(one) for one in self.left]
 
     def see(self, number: float, surface: Floats, tets: Floats | None) -> tuple[Decision, ...]:
-        """The effects that matter in a frame, by its ``surface`` (n, 3) and the points ``tets`` (k, 3), where it has tetrahedra."""
+        """The effects that matter in a frame, by its ``surface`` (n, 3) and the points ``tets`` (k, 3), if it has tetrahedra."""
         acting, others = ([(one, one.amount(number)) for one in some] for some in (self.case.effects, self.left))
         self.frames[number] = surface, None if tets is None else self.sampled.sizes(tets, acting, others)
         estimated = self.known.stress_tolerance
         return self._found(number, estimated if self._tense else max(estimated, STRESS_TOLERANCE * self._most()))
 
     def end(self) -> tuple[Decision, ...]:
-        """The effects that matter at the first frame at which any does, now that all stresses are known."""
+        """The effects that matter at the first frame at which any effect matters, once all stresses are known."""
         if any(stresses is None for _, stresses in self.frames.values()):
             return ()
         tolerance = STRESS_TOLERANCE * max(self._most(), ROUNDING * self.known.shear)
@@ -173,13 +174,13 @@ class Watch:
         return tuple(replace(one, turned_out=number) for one in each if one.needed)
 
     def _decided(self, i: int, now: Estimates, stresses: StressSizes | None) -> Decision:
-        """The decision on an effect: by the stress that it adds in the tetrahedra, and for fibres by that alone."""
+        """The decision on an effect: by the stress that it adds in the tetrahedra, and for fibres by this stress only."""
         effect = self.left[i]
         found = effect.indicator(now)
         assert found is not None  # effects that were left out have one
         if stresses is not None:
             guessed = 0.0 if "fibre" in effect.needs else found.stress
-            found = replace(found, stress=float(np.max([guessed, stresses.added[i]])))  # NaN where either is
+            found = replace(found, stress=float(np.max([guessed, stresses.added[i]])))  # NaN if either is
         return decision(effect, found, now)
 
     def _moving(self, now: Estimates, number: float) -> Estimates:

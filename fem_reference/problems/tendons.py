@@ -23,7 +23,7 @@ def force_name(attachment: str) -> str:
 
 
 def check(body: Body) -> None:
-    """Raise InputError where a tendon is combined with tension at rest."""
+    """Raise InputError if a tendon is combined with tension at rest."""
     if in_situ.among(body.effects) is not None and any(entry.anchor is not None for entry in body.prescribed):
         raise InputError(
             "effects", "a tendon beside in_situ", "one of them: the tension of a tendon at rest is unknown"
@@ -38,7 +38,7 @@ def pulling(rest: Setup, mesh: TetMesh, fibres: Polylines, effects: tuple[Effect
 
 
 def _springs(effect: Tendon, rest: Setup, mesh: TetMesh, fibres: Polylines) -> Prescribed:
-    """The springs of an ``effect``; InputError where no fibre continues as its tendon."""
+    """The springs of an ``effect``; InputError if no fibre continues as its tendon."""
     number = [one.attachment for one in rest.attached].index(effect.on)
     entry, place = rest.attached[number], f"effect {effect.title}"
     if entry.tendon is None:

@@ -17,11 +17,11 @@ from fem_reference.problems.contact import penalty, remaining
 @dataclass(frozen=True)
 class Touching:
     """Contact, with any sliding, between two parts of the surface of a body, ``one`` and ``other``: regions of its facets, by name.
-    The pressure per rest area is that of ``ContactLaw`` with ``stiffness`` k [MPa/mm] and ``smoothing`` d [mm], of the gap between
-    points of either part and the present surface of the other. Under pressure p they overlap by p / k. ``friction``: the
+    The pressure per rest area follows ``ContactLaw`` with ``stiffness`` k [MPa/mm] and ``smoothing`` d [mm], for the gap between
+    points of either part and the present surface of the other. Under pressure p the parts overlap by p / k. ``friction``: the
     coefficient of Coulomb's law, as in ``ContactLaw``; None without friction. ``relaxed``: two frame numbers over which an overlap
-    at rest is removed, as with bones. If None, an overlap of two parts presses at once, and that of a part with itself only once it
-    has come apart.
+    at rest is removed, as with bones. If None, an overlap of two parts presses at once, and an overlap of a part with itself only
+    after it has opened.
     """
 
     one: str
@@ -38,7 +38,7 @@ class Touching:
 
     @property
     def pressure_name(self) -> str:
-        """The name under which a frame of several laws reports the greatest pressure of this one."""
+        """The name under which a frame of several laws reports the greatest pressure of this law."""
         return pressure_name(self.one, self.other)
 
     def allowance(self, frame: float) -> float:
@@ -48,7 +48,7 @@ class Touching:
         return float(self.one == self.other) if self.relaxed is None else remaining(self.relaxed, frame)
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative in the gap [MPa/mm]; NaN where the gap is NaN."""
+        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative in the gap [MPa/mm]; NaN if the gap is NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
 
 
@@ -58,7 +58,7 @@ def pressure_name(one: str, other: str) -> str:
 
 
 def with_itself(acting: Sequence[Effect], part: str) -> tuple[Touching, ...]:
-    """The contact of a ``part`` with itself, where the effects ``acting`` in a single muscle have it."""
+    """The contact of a ``part`` with itself, if the effects ``acting`` in a single muscle include it."""
     law = among(acting)
     return () if law is None else (Touching(part, part, law.stiffness, law.smoothing, law.friction),)
 
@@ -86,7 +86,7 @@ def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[st
 
 
 def _check_pairs(touching: Sequence[Touching], facets: Mapping[str, Ints]) -> None:
-    """Raise InputError where a pair of facets is under two laws, whose pressures would add up."""
+    """Raise InputError if a pair of facets is under two laws, whose pressures would add up."""
     names = {name for law in touching for name in (law.one, law.other)}
     own = {name: set(map(tuple, np.sort(facets[name], axis=1).tolist())) for name in names}
     for (i, law), (j, other) in combinations(enumerate(touching), 2):

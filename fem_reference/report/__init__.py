@@ -7,7 +7,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.report.pages import Page, write
 from fem_reference.report.tables import summary
 
-NAME = "report"  # the name of the page of a comparison, which has a folder of its own
+NAME = "report"  # the name of the page of a comparison, which has its own folder
 __all__ = ["NAME", "Page", "of_comparison", "summary", "write"]
 
 

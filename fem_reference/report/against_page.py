@@ -1,4 +1,4 @@
-"""The page of two versions of one solver: statistics that became better or worse, and the places."""
+"""The page of two versions of one solver: statistics that improved or became worse, and where."""
 
 import math
 from functools import partial
@@ -24,7 +24,7 @@ MOST_CURVES = 8
 
 
 def page(versions: Versions, setup: Setup) -> Page:
-    """The page of two versions of a solver on a case of that ``setup``."""
+    """The page of two versions of a solver on a case with this ``setup``."""
     current = versions.current
     # Pictures of the frame with the greatest change: before, now, and the change, on one colour scale; or the missing software.
     run, found = current.candidate, versions.place
@@ -56,7 +56,7 @@ def headline(versions: Versions) -> str:
 
 
 def word(versions: Versions) -> str:
-    """The verdict of the headline: worse where any statistic is worse, else mixed, else better."""
+    """The verdict of the headline: worse if any statistic is worse, else mixed, else better."""
     return next((one for one in ORDER[:3] if versions.count(one)), "as it was")
 
 
@@ -82,7 +82,7 @@ def _unit(one: Change) -> str:
 
 
 def place(versions: Versions) -> str:
-    """The vertex that moved most, in words; empty where none moved."""
+    """The vertex that moved most, in words; empty if none moved."""
     if versions.place is None:
         return ""
     i, vertex, distance = versions.place
@@ -125,7 +125,7 @@ def _curve(one: Change, i: int) -> Drawing:
 
 
 def _moved(versions: Versions) -> Drawing | None:
-    """The distance of vertices from their earlier positions; None where none moved."""
+    """The distance of vertices from their earlier positions; None if none moved."""
     if versions.place is None:
         return None
 
@@ -156,7 +156,7 @@ def _shots(versions: Versions, i: int) -> list[Shot]:
 
 
 def _everywhere(versions: Versions, i: int) -> Floats:
-    """The distance (n,) [mm] of each vertex from its earlier position; where that is unknown, the distance of the nearest other."""
+    """The distance (n,) [mm] of each vertex from its earlier position; if unknown, that of the nearest vertex with a value."""
     if versions.before is not None:
         return np.asarray(versions.moved[i])
     rest = versions.current.rest

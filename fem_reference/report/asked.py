@@ -1,4 +1,4 @@
-"""Pages requested by a command: their names, which state how each differs, and the index of all pages in a folder."""
+"""Pages requested by a command: their names, which state the differences, and the index of all pages in a folder."""
 
 import hashlib
 import logging
@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 LONGEST = 100  # characters of the name of a page
 INDEX = "index"  # the name of the page of the index, and its kind
-# Names under which other HTML files in subfolders are listed too.
+# Names of other HTML files in subfolders that are listed too.
 _OTHERS = ("report.html", "index.html")
 
 
@@ -41,7 +41,7 @@ class Asked:
 
     @property
     def command(self) -> str:
-        """The command line that makes the page, without options that do not change its numbers."""
+        """The command line that makes the page, without options that leave its numbers unchanged."""
         return shlex.join(["fem-reference", self.verb, *(word for part in self.parts for word in part.words)])
 
     @property
@@ -62,7 +62,7 @@ def _plain(text: str) -> str:
 
 
 def written(asked: Asked, page: Page, folder: Path, name: str | None = None) -> tuple[Path, list[str]]:
-    """Write a page, under ``name`` if given, and the index, unless that would overwrite another file; its path and messages."""
+    """Write a page, under ``name`` if given, and the index, without overwriting other files; the path of the page, and messages."""
 
     def where(name: str) -> Path:
         return folder / name / f"{asked.page}.html" if asked.page else folder / f"{name}.html"
@@ -89,7 +89,7 @@ class IndexEntry:
 
 
 def write_index(folder: Path) -> None:
-    """Write ``index.html`` of the pages in ``folder``, unless a file of that name exists that is not such an index."""
+    """Write ``index.html`` of the pages in ``folder``, unless another file of this name exists."""
     path = folder / f"{INDEX}.html"
     there = pages.read(path)
     if path.exists() and (there is None or there.kind != INDEX):
@@ -105,7 +105,7 @@ def index(entries: list[IndexEntry], others: list[str]) -> Page:
 
 
 def entries_of(folder: Path) -> tuple[list[IndexEntry], list[str]]:
-    """The pages in ``folder`` and the folders in it, the newest first, and the addresses of other files that may be pages."""
+    """The pages in ``folder`` and its subfolders, the newest first, and the addresses of other files that may be pages."""
     entries, others = [], []
     for path in sorted({*folder.glob("*.html"), *folder.glob("*/*.html")}):
         head, address = pages.read(path), path.relative_to(folder).as_posix()

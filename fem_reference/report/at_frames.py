@@ -1,4 +1,4 @@
-"""Frames in words: a frame number of the case, with the time and the bones' angles, where these are known."""
+"""Frames in words: a frame number of the case, with the time and the bones' angles, if these are known."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -14,7 +14,7 @@ from fem_reference.scenes.case import Case
 
 @dataclass(frozen=True)
 class Column:
-    """A quantity that belongs to a frame: its ``name``, ``unit``, and its value ``at`` a frame number."""
+    """A quantity of a frame: its ``name``, its ``unit``, and its value ``at`` a frame number."""
 
     name: str
     unit: str

@@ -34,7 +34,7 @@ def text(found: Calibration) -> str:
 
 
 def _line(one: Estimate) -> str:
-    """An estimate with its interval, and a remark if they are not determined."""
+    """An estimate with its interval, and a remark if the parameter is not determined."""
     unit = f" {one.parameter.unit}" if one.parameter.unit else ""
     said = (
         f"  {one.parameter.title}: {one.value:.5g}{unit}, {100 * CONFIDENCE:.0f} % from {one.low:.5g} to {one.high:.5g}"

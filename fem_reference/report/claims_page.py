@@ -53,7 +53,7 @@ def facts(claims: Claims) -> dict[str, Any]:
 
 
 def drawing(claims: Sequence[Claim], metric: str, name: str) -> Drawing:
-    """Bars against errors, a colour for each case; ``name`` makes the ids in the drawing unique."""
+    """Bars against errors, with a colour for each case; ``name`` makes the ids in the drawing unique."""
     title = f"{words(metric).capitalize()}: claimed against true"
 
     def draw(_: Figure, axes: Axes) -> None:

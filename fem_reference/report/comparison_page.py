@@ -38,7 +38,7 @@ def page(comparison: Comparison) -> Page:
 
 
 def _failed(comparison: Comparison) -> str:
-    """The reason why the reference did not reach all frames, and the scope of the page then; empty where it did."""
+    """The reason why the reference did not reach all frames, and the resulting scope of the page; empty if it reached all."""
     reference, wanted = comparison.reference, len(comparison.reference.numbers)
     if reference.outcome.status == "converged":
         return ""
@@ -85,8 +85,8 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
 
 
 def widest(bar: ErrorBar, measure: Measure | None) -> int:
-    """The index of the widest ``bar`` among the frames in which the reference's ``measure`` has a value (a moment arm has one only
-    where there is a force); an unknown bar there counts as the widest.
+    """The index of the widest ``bar`` among the frames in which the reference's ``measure`` has a value (a moment arm needs a
+    force); an unknown bar in such a frame counts as the widest.
     """
     if measure is None or not np.isfinite(measure.values).any():
         return bar.widest
@@ -100,7 +100,7 @@ def gap(run: Run) -> float:
 
 
 def headlines(comparison: Comparison) -> Headlines:
-    """The verdict on each candidate with its greatest deviations; then the reference's own checks and doubts."""
+    """The verdict on each candidate with its greatest deviations; then the checks of the reference, and doubts about it."""
     found = list[tuple[str, str, str]]()
     for run in comparison.candidates:
         ended = "" if run.outcome.status == "converged" else f"{run.outcome.status}; "
@@ -116,7 +116,7 @@ def _checks(comparison: Comparison) -> str:
 
 
 class VerdictRow(NamedTuple):
-    """A row of the top table: a ``run``, its verdict, its headline measures, None where it lacks one, and remarks."""
+    """A row of the top table: a ``run``, its verdict, its headline measures (None if missing), and remarks."""
 
     run: Run
     word: str
@@ -125,7 +125,7 @@ class VerdictRow(NamedTuple):
 
 
 def first_rows(comparison: Comparison) -> list[VerdictRow]:
-    """The rows of the top table, the reference last, with its doubts beside its verdict."""
+    """The rows of the top table; the reference is last, with the doubts about it."""
     rows = list[VerdictRow]()
     for run in comparison.candidates:
         found = comparison.deviations.get(run.name, ())
@@ -140,7 +140,7 @@ def first_rows(comparison: Comparison) -> list[VerdictRow]:
 
 
 def _headline_keys(comparison: Comparison) -> list[tuple[str, str]]:
-    """The metric and statistic of each column of the top table: those that some candidate has."""
+    """The metric and statistic of each column of the top table: all that some candidate has."""
     every = [one for run in comparison.candidates for one in comparison.deviations.get(run.name, ())]
     return [key for key in described("headline") if find(every, *key) is not None]
 

@@ -45,7 +45,7 @@ def page(found: Credibility) -> Page:
 
 
 def by_grade(found: Credibility) -> list[tuple[str, list[str], str]]:
-    """Each grade that occurs with its quantities and its meaning; the first, validated, also where it has none."""
+    """Each grade that occurs, with its quantities and its meaning; the first grade, validated, even without quantities."""
     names = {grade: [row.claim.name for row in found.rows if row.grade == grade] for grade in GRADES}
     return [(grade, names[grade], meaning) for grade, meaning in GRADES.items() if names[grade] or grade == "validated"]
 
@@ -61,13 +61,13 @@ def said(found: Credibility) -> str:
 
 
 def met(values: Mapping[str, float], one: Beside) -> bool | None:
-    """True where the value for a comparison is within its uncertainty; None without a value."""
+    """True if the value for a comparison is within its uncertainty; None without a value."""
     return abs(values[one.name] - one.truth) <= one.within if one.name in values else None
 
 
 def differences(row: Row, arms: Iterable[ArmsBeside]) -> str:
-    """The number of measured values that the model misses on either side, and the distances: for moment arms in mm, the mean over
-    the poses of each case, else in uncertainties of the measurement. Wrong orders are counted separately.
+    """The number of measured values that the model misses on either side, and the distances: for moment arms the mean over the
+    poses of each case in mm, otherwise in uncertainties of the measurement. Wrong orders are counted separately.
     """
     own = [one for one in row.beside if one.kind == "measurement"]
     orders, numbers = ([one for one in own if one.is_order is kind] for kind in (True, False))
@@ -144,7 +144,7 @@ def facts(found: Credibility) -> dict[str, Any]:
 
 
 def _drawing(arms: ArmsBeside) -> Drawing:
-    """The range of the fibres' arms over the angle, beside the published curve or range."""
+    """The range of the fibres' arms over the angle, with the published curve or range."""
 
     def draw(_: Figure, axes: Axes) -> None:
         at, own, known = arms.found.angles, arms.found, arms.published

@@ -12,15 +12,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, MeasurementContext, described, find
 from fem_reference.metrics.moment_arm import turning
-from fem_reference.report.drawings import (
-    BAND,
-    NOT_A_NUMBER,
-    REFERENCE,
-    Drawing,
-    looks,
-    over_frames,
-    plain_numbers,
-)
+from fem_reference.report.drawings import BAND, NOT_A_NUMBER, REFERENCE, Drawing, looks, over_frames, plain_numbers
 from fem_reference.report.tables import inversion
 from fem_reference.report.words import words
 
@@ -46,13 +38,13 @@ def curves(comparison: Comparison) -> list[Drawing]:
 
 
 def label_of(inverted: Measure) -> str:
-    """The words that distinguish one inversion measure from the others: the places at which det F is smallest."""
+    """The words that distinguish the inversion measures: the places at which det F is smallest."""
     return words(inverted.statistic.removeprefix("min_det_F").lstrip("_"))
 
 
 def _of_runs(comparison: Comparison, key: tuple[str, str], title: str, i: int | None = None) -> Drawing | None:
     """A measure of every run from rest, with the error bar of the reference; over frames, or over the angle of joint ``i`` at the
-    frames where it rotates alone. None where nothing is known there.
+    frames in which only this joint rotates. None if nothing is known.
     """
     context, numbers = comparison.context, comparison.reference.numbers
     measures = {run.name: find(comparison.changes[run.name], *key) for run in comparison.runs}
@@ -143,7 +135,7 @@ def _band(axes: Axes, along: Sequence[float] | Floats, middle: Floats, bar: Floa
 
 
 def _line(axes: Axes, numbers: Sequence[float] | Floats, measure: Measure, label: str, **look: str | float) -> None:
-    """A measure over frames; a cross on the frame axis where it is not finite."""
+    """A measure over frames; a cross on the frame axis if the value is not finite."""
     frames, values = np.asarray(numbers), np.asarray(measure.values, float)
     bad = ~np.isfinite(values)
     axes.plot(frames, np.where(bad, np.nan, values), label=label, **look)  # type: ignore[arg-type]

@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -19,8 +20,8 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.report.words import number
 
 REFERENCE = "#222222"
-# Okabe and Ito's palette for all kinds of colour vision, without its black and yellow; then those of Tol's muted colours that
-# differ from all of these; then colours between them. style.css has variants of all for dark pages.
+# Okabe and Ito's palette for all kinds of colour vision, without black and yellow; then the muted colours of Tol that differ from
+# these; then colours in between. style.css has variants of all for dark pages.
 PALETTE = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255"),
     *("#999933", "#332288", "#777777", "#7a4a1e", "#951afe", "#1e5b09", "#d81b8c", "#1fb80d"),
@@ -40,25 +41,11 @@ _OURS = (
     ),
     *("xpbd", "arap", "pbd_program", "arap_volume_step", "line_of_action"),
 )
-# The number of lines that differ by colour alone; further ones are dashed.
+# The number of lines that differ by colour alone; further lines are dashed.
 _BY_COLOUR, _DASHES = 6, ("-", "--", ":", "-.")
 NOT_A_NUMBER = "not a number"
 BAND = "#01010120"  # nearly black, as matplotlib omits pure black from SVG
-LOOK: Any = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "fem_reference",
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "sans-serif"],
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#888888",
-    "axes.grid": True,
-    "grid.color": "#e8e8e8",
-    "xtick.color": "#444444",
-    "ytick.color": "#444444",
-    "legend.frameon": False,
-}
+LOOK: Any = dict(mpl.rc_params_from_file(Path(__file__).with_suffix(".mplstyle"), use_default_template=False))
 # Names in style.css of colours that change on dark pages.
 _NAMED = {
     "#e8e8e8": "grid",
@@ -77,7 +64,7 @@ _NAMED = {
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawing: its ``title`` and its ``markup``, an ``<svg>`` or an ``<img>``; or the reason why it is ``missing``."""
+    """A drawing: its ``title``, and its ``markup`` (an ``<svg>`` or an ``<img>``) or the reason why it is ``missing``."""
 
     title: str
     markup: str = ""
@@ -85,7 +72,7 @@ class Drawing:
 
 
 def colour_of(i: int) -> str:
-    """The i-th colour: 0 is that of the reference, then follow the palette and ever darker shades of its colours.
+    """The i-th colour: 0 is the colour of the reference; then follow the palette and ever darker shades of it.
 
     >>> colour_of(0), colour_of(1), colour_of(16)
     ('#222222', '#0072b2', '#004c77')
@@ -107,7 +94,8 @@ def look_of(i: int) -> dict[str, Any]:
 
 
 def looks(names: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Colour and dashes by the name of a run or solver: fixed for our solvers on all pages, the next free ones for others.
+    """Colour and dashes by the name of a run or solver: fixed for our solvers on all pages, the next free colour and dashes for
+    others.
 
     >>> looks(["reference", "mine", "pbd"])["pbd"] == looks(["fenicsx", "pbd"])["pbd"] == look_of(1)
     True
@@ -145,8 +133,8 @@ def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], 
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
-    """Add a legend above, in as many columns as fit, with the mark of values that are not a number last; beyond three rows the
-    figure grows.
+    """Add a legend above, in as many columns as fit. The mark of values that are not a number is last. Beyond three rows the figure
+    grows.
     """
     entries = sorted(zip(*axes.get_legend_handles_labels(), strict=True), key=lambda entry: entry[1] == NOT_A_NUMBER)
     handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
@@ -170,8 +158,8 @@ def positive(sizes: Floats, errors: Floats) -> tuple[Floats, Floats]:
 
 
 def plain_numbers(axis: Any) -> None:
-    """Label the major ticks of a logarithmic axis with plain numbers, the minor ones only where fewer than two major ones are
-    visible, and there only 2 and 5 of each decade where more would overlap.
+    """Label the major ticks of a logarithmic axis with plain numbers. Label minor ticks only if fewer than two major ticks are
+    visible, and only 2 and 5 of each decade if more labels would overlap.
     """
 
     def minor(value: float, _: int | None) -> str:

@@ -17,7 +17,8 @@ from fem_reference.report.words import duration, listed, number, words
 MAIN = "surface_deviation.rms"
 # The heading of each column of the table, by name.
 HEADS = {".".join(key): one.label.lower() for key, one in described("main").items()}
-# The axis ends at this factor below the least change that counts; smaller changes are drawn at its end, with their value.
+# The axis ends at this factor below the least change that counts; smaller changes are drawn at the end of the axis, with their
+# value.
 _DEPTH = 10.0
 
 
@@ -41,7 +42,7 @@ def page(found: CaseOmissions) -> Page:
 
 
 def label(ablation: Ablation, omission: Omission) -> str:
-    """The effects or features left out, in words: "all of them" where none remains that could be."""
+    """The effects or features left out, in words: "all of them" if no other could be left out."""
     if not omission.left_out:
         return "nothing"
     every = {name for one in ablation.omissions for name in one.left_out}
@@ -60,7 +61,7 @@ def percent(share: float) -> str:
 
 
 def phases(found: CaseOmissions) -> list[str]:
-    """The phases on which some run of the case states that it spent time."""
+    """The phases in which some run of the case spent time."""
     runs = [one for ablation in found.ablations for one in (ablation.whole, *ablation.omissions)]
     return [name for name in omissions.PHASES if any(one.phase(name) > 0 for one in runs)]
 
@@ -103,7 +104,7 @@ def _most(found: CaseOmissions, one: Omission) -> str:
 
 
 def drawing(found: CaseOmissions) -> Drawing | None:
-    """The change that an omission makes against the time that it saves; None where there is none to draw."""
+    """The change due to an omission against the time that it saves; None if there is nothing to draw."""
     points = {
         ablation.name: [
             (label(ablation, one), 100 * (1 - share), one.changes[MAIN])
@@ -136,7 +137,7 @@ def drawing(found: CaseOmissions) -> Drawing | None:
 
 
 def _draw(axes: Axes, rows: list[tuple[str, float, float]], floor: float, colour: str, name: str) -> None:
-    """Draw the points of a run, none below ``floor`` [mm]: a smaller change is written beside its point."""
+    """Draw the points of a run at ``floor`` [mm] or above: a smaller change is written beside its point."""
     if rows:
         heights = [max(change, floor) for _, _, change in rows]
         axes.plot([saved for _, saved, _ in rows], heights, "o", color=colour, markersize=5, label=name)

@@ -16,7 +16,7 @@ from fem_reference.metrics import described
 from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic, look_of
 from fem_reference.report.pages import Page
 
-# Distances between two Gaussians, in radii: from 2 sqrt(log 2) = 1.665 on, their surface has two parts.
+# Distances between two Gaussians, in radii: from 2 sqrt(log 2) = 1.665 on, the surface has two parts.
 _APART = (1.2, 1.6, 1.65, 1.7)
 # Control points in the plane, as in the report's Figure 3.1.
 _POINTS = np.array([[0.0, 0.0], [1.0, 1.6], [2.2, 1.4], [3.0, -0.4], [4.4, 0.6]])
@@ -40,9 +40,9 @@ def page(found: Estimation) -> Page:
 
 
 def said(found: Estimation) -> str:
-    """The best technique for fibres and the accuracy of Gaussians, in sentences, each where it was measured."""
+    """The best technique for fibres and the accuracy of Gaussians, in sentences, if they were measured."""
     sentences = list[str]()
-    if found.curves:  # empty where no fibre has enough points
+    if found.curves:  # empty if no fibre has enough points
         errors = {name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES}
         best = min(errors, key=lambda name: float(errors[name]))
         sentences.append(f"Of the curves through a few points of a fibre, {best} deviates least")

@@ -26,13 +26,13 @@ from fem_reference.runs.store import Run
 
 VALUES, DIFFERENCES = "viridis", "RdBu_r"
 _DPI = 150
-_LIGHT = np.array([0.3, 0.45, 0.84])  # the direction towards the light, which is above the eye and to its right
+_LIGHT = np.array([0.3, 0.45, 0.84])  # the direction towards the light, above and to the right of the eye
 _LISTING: Any = {"color": "blue", "linewidth": 2, "marker": "o", "markersize": 6, "markerfacecolor": "lime"}
 _MARKERS = "xd+s^v"
 
 
 def rival(example: Comparison) -> Run | None:
-    """The run to be shown beside the reference: the listing, else the first candidate."""
+    """The run to be compared with the reference: the listing, else the first candidate."""
     listings = [run for run in example.candidates if run.solver == "listing"]
     return next(iter([*listings, *example.candidates]), None)
 
@@ -81,7 +81,7 @@ def _lines(example: Comparison) -> list[Drawing]:
 
 
 def _distances(example: Comparison, known: list[Run]) -> Drawing:
-    """The distance of every run to the exact solution at the nodes, or of the candidates to the reference."""
+    """The distance of every run from the exact solution at the nodes, or of the candidates from the reference."""
     exact, runs, base = example.setup.exact, known, example.reference.vertex_values[-1]
     if exact is not None:
         base, title = at(exact, example.setup.mesh.points), "Distance to the exact solution at the nodes"
@@ -107,11 +107,11 @@ def _sorted(run: Run, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _look(i: int, run: Run) -> dict[str, Any]:
-    """The style of a line: that of the listing's own ``plot`` command for the listing, else by the index of the run."""
+    """The style of a line: for the listing the style of its ``plot`` command, otherwise by the index of the run."""
     if run.solver == "listing":
         return dict(_LISTING)
     marker = _MARKERS[i % len(_MARKERS)]
-    colour = colour_of(i + 1 if i else 0)  # colour 1 is left out, as it resembles that of the listing
+    colour = colour_of(i + 1 if i else 0)  # colour 1 is left out, as it resembles the colour of the listing
     return {"color": colour, "linewidth": 1, "linestyle": "--", "marker": marker, "markersize": 3}
 
 
@@ -197,7 +197,7 @@ class _Window:
 
     @property
     def half(self) -> tuple[float, float]:
-        """Half its width and height: a square, narrower where it is higher than wide."""
+        """Half its width and height: a square, narrower if it is higher than wide."""
         width, height = (float(length) for length in 0.53 * (self.high - self.low)[:2])
         height = max(width, height)
         return max(width, height / 2), height
@@ -218,7 +218,7 @@ def _windows(points: Floats, anchors: Floats) -> list[_Window]:
 
 
 def _body(figure: Figure, example: Comparison, values: Floats, scale_of: Floats, colours: str) -> None:
-    """Draw a surface in space seen along z from the side of its anchors, y up, each window with its own colour scale."""
+    """Draw a surface in space, seen along z from the side of its anchors with y up. Each window has its own colour scale."""
     mesh = example.setup.mesh
     anchors = mesh.points[~np.isnan(example.setup.fixed[: len(mesh.points)])]
     behind = len(anchors) > 0 and anchors[:, 2].mean() < mesh.points[:, 2].mean()
@@ -240,7 +240,7 @@ def _body(figure: Figure, example: Comparison, values: Floats, scale_of: Floats,
 
 
 def _front(mesh: FieldMesh, values: Floats, scale: ScalarMappable, line: float) -> PolyCollection:
-    """The triangles as seen along z, the furthest first, darker the more they are turned away from the light."""
+    """The triangles as seen along z, the furthest first; triangles turned away from the light are darker."""
     corners = mesh.points[mesh.cells]
     across = normals(corners)
     light = np.abs(across @ _LIGHT) / np.linalg.norm(across, axis=1)

@@ -45,8 +45,8 @@ def _contents(examples: tuple[Comparison, ...]) -> dict[str, Any]:
 
 def _section() -> dict[str, list[dict[str, str]]]:
     """The tables of the file about section 4.6 of the report: each ``difference`` between a ``text`` and its ``listing``, by
-    ``section``, with its ``measured`` effect; and the ``caption`` of each ``figure`` of a ``case``, as pictures of the report are
-    not distributed.
+    ``section``, with its ``measured`` effect; and the ``caption`` of each ``figure`` of a ``case`` (pictures of the report are not
+    distributed).
     """
     return tomllib.loads(Path(__file__).with_name("octave_section.toml").read_text(encoding="utf-8"))
 
@@ -77,7 +77,7 @@ def apart(example: Comparison) -> str:
 
 
 def bounds(run: Run) -> tuple[float, float] | tuple[None, None]:
-    """The least and the greatest value at a vertex, NaN where one is not a number; None where the run failed."""
+    """The least and the greatest value at a vertex, NaN if one is not a number; None if the run failed."""
     if _lost(run):
         return None, None
     return float(run.vertex_values[-1].min()), float(run.vertex_values[-1].max())
@@ -89,19 +89,19 @@ def _lost(run: Run) -> bool:
 
 
 def seconds(run: Run) -> float | None:
-    """The time [s] that a run took, None where it is not stated."""
+    """The time [s] that a run took, None if it is not stated."""
     cost = run.outcome.cost
     parts = [value for key, value in cost.items() if key.startswith("seconds_")]
     return sum(parts) if parts else cost.get("seconds")
 
 
 def form(example: Comparison, run: Run) -> str:
-    """The weak form that was solved: that of the run, else that of the problem."""
+    """The weak form that was solved: the form of the run, else of the problem."""
     return str(run.origin.get("form", example.setup.form))
 
 
 def pivot(example: Comparison) -> dict[str, list[float | None]]:
-    """The values of every run by metric, None where a run has none; empty where the reference failed."""
+    """The values of every run by metric, None if a run has none; empty if the reference failed."""
     if _lost(example.reference):
         return {}
     measured = {"reference": example.changes["reference"]} | example.deviations

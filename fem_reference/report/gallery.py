@@ -58,12 +58,12 @@ def shots(comparison: Comparison) -> list[Shot]:
 
 
 def of_comparison(comparison: Comparison) -> tuple[list[Shot], str]:
-    """The figures of the runs of a comparison, each at its worst frame, or none and the missing software."""
+    """The figures of the runs of a comparison, each at its worst frame; if software is missing, no figures and its name."""
     return figures(comparison.setup, comparison.reference.surface, shots(comparison))
 
 
 def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Shot], str]:
-    """The figures of ``wanted``, or none and the missing software."""
+    """The figures of ``wanted``; if software is missing, no figures and its name."""
     try:
         drawn = draw(setup, surface, wanted)
     except MissingSoftware as error:
@@ -73,7 +73,7 @@ def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Sh
 
 
 def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes, bytes]]:
-    """Two WebP pictures of each shot; MissingSoftware where the drawing program failed."""
+    """Two WebP pictures of each shot; MissingSoftware if the drawing program failed."""
     with scratch_folder() as folder:
         job = folder / "job.pickle"
         job.write_bytes(pickle.dumps(_job(setup, surface, wanted)))
@@ -85,7 +85,7 @@ def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes
 
 
 def top(wanted: list[Shot]) -> float:
-    """The end of the colour scale of all pictures [mm]: the greatest distance in one of them."""
+    """The end of the colour scale of all pictures [mm]: the greatest distance in any picture."""
     return max((float(shot.distances.max()) for shot in wanted if shot.distances is not None), default=0.0)
 
 
@@ -114,7 +114,7 @@ def ramp() -> str:
 def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
     """Unit vectors (2, 3) towards the cameras: along the smallest and the middle principal axis of the surface.
 
-    The first view has the largest silhouette; the second is a quarter turn about the long axis away. Both cameras are on the
+    The first view has the largest silhouette; the second is a quarter turn away about the long axis. Both cameras are on the
     side away from the bones' vertices. An axis along which a bone of closed form hides the surface comes last.
     """
     middle = surface.points.mean(axis=0)
@@ -130,7 +130,7 @@ def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
 
 
 def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
-    """True where bones of closed form hide most of ``points`` (n, 3), within four times ``view`` (3,) towards the camera."""
+    """True if bones of closed form hide most of ``points`` (n, 3), within four times ``view`` (3,) towards the camera."""
     behind = np.zeros(len(points), bool)
     for solid in (bone.solid for bone in bones if bone.solid is not None):
         for step in np.arange(1, 17) / 4:
@@ -139,7 +139,7 @@ def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
 
 
 def _worst(comparison: Comparison, run: Run) -> Iterator[Shot]:
-    """The shot of a candidate at its worst frame; none where no frame is finite."""
+    """The shot of a candidate at its worst frame; none if no frame is finite."""
     distances = to_same_vertex(run, comparison.reference)
     drawable = np.isfinite(distances).all(axis=1)
     if not drawable.any():

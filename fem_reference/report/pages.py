@@ -1,4 +1,4 @@
-"""The record of a page, its template, its writing, and its head, a description that the index shows.
+"""The record of a page, its template, its writing, and its head, a description that is shown in the index.
 
 Only the command that made a page overwrites it.
 """
@@ -30,7 +30,7 @@ from fem_reference.report.words import duration, listed, number, ratio, title_of
 # Places in the frame of all pages (base.html): of the facts, and of the command that made the page.
 _FACTS, _ASKED = "<!-- facts of the page -->", "<!-- what was asked -->"
 _BEGIN, _END = '<script type="application/json" id="page-facts">', "</script>"
-_HEAD = 2**17  # the number of bytes at the beginning of a file within which the facts are looked for
+_HEAD = 2**17  # the number of bytes at the beginning of a file that are searched for the facts
 _SIDE = 160  # the greatest width and height of the thumbnail [pixels]
 _PICTURE = re.compile(r'src="data:image/webp;base64,([A-Za-z0-9+/=]+)"')
 Headlines = tuple[tuple[str, str, str], ...]
@@ -60,8 +60,8 @@ class Page:
 
 @dataclass(frozen=True)
 class PageHead:
-    """The facts in the head of a page: those of its ``Page``; the command that ``asked`` for it, empty if a program wrote it; the
-    time when it was ``made``; and the source of its thumbnail (``picture``), empty without one.
+    """The facts in the head of a page: the facts of its ``Page``; the command that ``asked`` for it, empty if a program wrote it;
+    the time when it was ``made``; and the source of its thumbnail (``picture``), empty without a thumbnail.
     """
 
     kind: str
@@ -75,7 +75,7 @@ class PageHead:
 def write(page: Page, folder: Path, name: str, asked: str = "") -> Path:
     """Write the page ``name`` and its numbers into ``folder``; return its path.
 
-    All files are made before the first is written, and each appears whole or not at all.
+    All files are made before the first is written, and each is written completely or not at all.
     """
     beside = page.numbers_name or name
     texts = {} if page.numbers is None else {f"{beside}.json": json.dumps(page.numbers, indent=1, allow_nan=False)}
@@ -98,7 +98,7 @@ def stamped(page: Page, asked: str = "") -> str:
 
 
 def read(path: Path) -> PageHead | None:
-    """The head of the page at ``path``; None where there is no page of ours, or a damaged one."""
+    """The head of the page at ``path``; None if there is no page by this package, or if it is damaged."""
     if not path.is_file():  # reading a pipe would block
         return None
     try:
@@ -111,7 +111,7 @@ def read(path: Path) -> PageHead | None:
 
 def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]:
     """The ``name``, with a number if needed, whose page at ``where(name)`` does not exist or was made by the same command; and a
-    line that reports a page that exists, else an empty text.
+    line that reports an existing page, else an empty text.
     """
     for i in count(1):
         numbered = name if i == 1 else f"{name}-{i}"
@@ -125,7 +125,7 @@ def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]
 
 
 def small_picture(text: str) -> str:
-    """The thumbnail of the first picture of a page, empty where none can be read."""
+    """The thumbnail of the first picture of a page, empty if none can be read."""
     found = _PICTURE.search(text)
     if found is None:
         return ""

@@ -20,7 +20,7 @@ from PIL import Image
 COLOURS = "viridis"
 SIDE = 840
 _OVERSAMPLING = 2
-# A pixel of a body belongs to its outline if a pixel at a distance of four is outside the body.
+# A pixel of a body belongs to its outline if a pixel at a distance of four pixels is outside the body.
 _NEAR = np.logical_and.outer(*[np.isin(np.arange(9), (0, 4, 8))] * 2)
 _MUSCLE, _BONE, _LINE = "#b4574e", "#dedbd4", (25, 25, 25)
 
@@ -45,7 +45,7 @@ def _surface(points: NDArray[Any], triangles: NDArray[Any]) -> Any:
 
 
 def thinned(points: NDArray[Any], triangles: NDArray[Any], count: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Points and triangles of about ``count`` triangles in place of more, by quadric errors (Garland and Heckbert 1997,
+    """Points and triangles, reduced to about ``count`` triangles by quadric errors (Garland and Heckbert 1997,
     doi 10.1145/258734.258849): for pictures, not for computation. ``points`` (n, 3), ``triangles`` (m, 3) of any kind.
     """
     import pyvista
@@ -85,7 +85,9 @@ def _render(bodies: list[tuple[Any, dict[str, Any]]], camera: dict[str, Any]) ->
     import pyvista
 
     plotter = pyvista.Plotter(off_screen=True, window_size=[SIDE * _OVERSAMPLING] * 2)
-    plotter.render_window.SetMultiSamples(1)  # more take four fifths of the time, and oversampling smooths edges too
+    plotter.render_window.SetMultiSamples(
+        1
+    )  # more samples would take four fifths of the time, and oversampling smooths edges too
     plotter.set_background("white")
     for body, looks in bodies:
         plotter.add_mesh(body, **looks)

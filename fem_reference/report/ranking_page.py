@@ -1,4 +1,4 @@
-"""The page ``table-5-1``: numbers for the speed and precision of solvers, which the report rates with pluses and minuses."""
+"""The page ``table-5-1``: speed and precision of solvers in numbers; the report rates them with plus and minus signs."""
 
 import math
 from typing import Any
@@ -38,7 +38,7 @@ def page(table: Table) -> Page:
 
 
 def _load(table: Table) -> str:
-    """A warning where solvers were timed on a machine that was busy with other work, else empty."""
+    """A warning if solvers were timed on a machine that was busy with other work, else empty."""
     timed = (one.outcome.cost for one in table.results if one.seconds_per_frame)
     return under_load((cost.get(LOAD, math.nan) for cost in timed), LOADED)
 
@@ -116,7 +116,7 @@ def _drawing(table: Table) -> Drawing:
 
 
 def _label_of(one: SolverResult) -> str:
-    """The name of a solver, with its kind if it is not ours, as it may share the name of one of ours."""
+    """The name of a solver, with its kind if it is not ours, as it may have the name of one of our solvers."""
     ours = one.of_reference or one.solver != "recorded"
     return one.name if ours else f"{one.name} ({one.kind.lower()})"
 

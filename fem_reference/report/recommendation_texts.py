@@ -34,7 +34,9 @@ def facts(found: Recommendation, metric: str) -> dict[str, object]:
 
 
 def text(found: Recommendation, case: str, metric: str, unit: str, limit: float) -> str:
-    """The setting, or the nearest one to the ``limit`` of the error, with its error in a ``unit``, its time, and its evidence."""
+    """The setting, or the setting nearest to the ``limit`` of the error, with its error in a ``unit``, its time and its
+    evidence.
+    """
     alike = "the studied case" if len(found.of) == 1 else "the studied cases"
     measured = "measured on it" if found.measured else f"expected from {listed(list(found.of))}, {alike} most like it"
     one, lines = found.best or found.nearest, list[str]()
@@ -53,7 +55,7 @@ def text(found: Recommendation, case: str, metric: str, unit: str, limit: float)
             f"including margins: {number(margins.error)} times the error, {number(margins.time)} times the time"
         )
     if warning := under_load(found.loads, LOADED):
-        own = f" (this one: {100 * one.point.load:.0f} %)" if one.point.is_loaded else ""
+        own = f" (this one: {100 * one.point.load:.0f} %)" if one.point.load > LOADED else ""
         lines.append(f"{warning}{own}")
     return "\n".join(lines)
 
@@ -112,7 +114,7 @@ def _parts(one: Expected, unit: str, *, measured: bool) -> str:
 
 
 def _reason(one: Expected, unit: str, limit: float) -> list[str]:
-    """The bar of the truth as the reason why the nearest setting does not meet the ``limit`` of the error, where that is so."""
+    """The bar of the truth, if it is the reason why the nearest setting does not meet the ``limit`` of the error."""
     if one.bar >= limit:
         known = f"{number(one.bar)} {unit}"
         return [f"the truth itself is known only to {known}: no smaller error can be proven"]

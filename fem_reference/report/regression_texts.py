@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 from fem_reference.assessment.regression import WORST_FIRST, Check, Judgement, Question
 from fem_reference.io.texts import finite
 
-# The greatest number of judgements listed in a text; further ones are only counted.
+# The greatest number of judgements listed in a text; the others are only counted.
 MOST_ROWS = 15
 _COLUMNS = ("verdict", "question", "statistic", "frame", "was", "now", "allowed", "error bar")
 
@@ -36,7 +36,7 @@ def facts(check: Check) -> dict[str, Any]:
 
 
 def text(check: Check) -> str:
-    """The worst failures as lines of text, the reasons why others are inconclusive, and the verdict."""
+    """The worst failures as lines of text, the reasons for inconclusive judgements, and the verdict."""
     lines = _most([f"fail: {_named(one)} at frame {one.frame}: {one.why}" for one in _of(check, "fail")])
     open_: dict[str, list[str]] = {}
     for one in _of(check, "inconclusive"):
@@ -90,7 +90,7 @@ def junit(check: Check, seconds: float) -> str:
 
 
 def lost(case: str, candidate: str, why: list[str]) -> tuple[str, str]:
-    """A JUnit suite with one error, and a Markdown text, to replace older files; both state ``why`` nothing was judged."""
+    """A JUnit suite with one error, and a Markdown text, which replace older files; both state ``why`` nothing was judged."""
     name, reasons = f"{case}.{candidate}", "\n".join(why)
     root, suite = _suite(name, {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"})
     element = ElementTree.SubElement(suite, "testcase", {"classname": name, "name": "solvers", "time": "0"})
@@ -100,7 +100,7 @@ def lost(case: str, candidate: str, why: list[str]) -> tuple[str, str]:
 
 
 def _suite(name: str, counts: dict[str, str]) -> tuple[ElementTree.Element, ElementTree.Element]:
-    """The root of a JUnit file and the one suite in it, with ``counts`` at both."""
+    """The root of a JUnit file and its only suite, both with ``counts``."""
     root = ElementTree.Element("testsuites", counts)
     return root, ElementTree.SubElement(root, "testsuite", {"name": name} | counts)
 
@@ -133,7 +133,7 @@ def _few(names: list[str]) -> str:
 
 
 def _answers(check: Check) -> list[str]:
-    """Each question with its answer and the number of statistics of each verdict."""
+    """Each question with its answer and the number of statistics with each verdict."""
     asked: tuple[tuple[Question, str], ...] = (
         ("unchanged", "as it was"),
         ("within", "as near to the reference as allowed"),

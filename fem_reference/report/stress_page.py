@@ -20,7 +20,7 @@ _VIEW = np.array([-0.55, 0.7, -0.45])
 _MARK = "#3b6cf0"
 _LIT, _DARK, _BACK, _EDGE = (205, 120, 110), (120, 55, 48), (90, 130, 190), (60, 30, 26)
 _NO_PAPER = (255, 255, 255, 0)  # a transparent background, for light and dark pages
-_LEFT, _RIGHT, _TOP, _FLOOR = 52, 290, 8, 120  # the sides of the axes in a drawing of 300 by 150
+_LEFT, _RIGHT, _TOP, _FLOOR = 52, 290, 8, 120  # the ends of the axes in a drawing of 300 by 150
 
 
 def page(found: Stress) -> Page:
@@ -86,7 +86,7 @@ def _colour(facing: float) -> tuple[int, int, int]:
 
 def history(of: History, bound: float) -> dict[str, Any]:
     """The drawing of a quantity over frames: the title, the ``points``, the places of frames without a number (``lost``), the
-    height of the ``limit`` of a healthy run, and both ends of each axis; logarithmic where the values span decades.
+    height of the ``limit`` of a healthy run, and both ends of each axis; logarithmic if the values span decades.
     """
     values = np.asarray(of.values, float)
     known = np.isfinite(values)

@@ -25,7 +25,7 @@ from fem_reference.report.words import title_of as in_words
 
 REFERENCE = "fenicsx"
 TIME = "seconds_per_frame"
-# The statistic in the tables, and the quantities at equal values of which they compare solvers.
+# The statistic in the tables, and the quantities at whose equal values the tables compare solvers.
 MAIN = next(map(".".join, described("rank")))
 MATCHED = (TIME, "peak_memory_mb", "unknowns")
 
@@ -69,7 +69,7 @@ def page(study: Study) -> Page:
 
 
 def shown(case: CaseStudy) -> list[str]:
-    """The statistics with a front: those with errors of two points or more (a case without joints has no moment arms)."""
+    """The statistics with a front: statistics with errors of two or more points (a case without joints has no moment arms)."""
     known = [name for point in case.points for name in point.errors]
     return [name for name in map(".".join, described("rank")) if known.count(name) > 1]
 
@@ -131,7 +131,7 @@ def answered(case: CaseStudy) -> tuple[Answer, ...]:
 
 
 def load_of(points: Iterable[Point]) -> str:
-    """A warning where times of ``points`` were measured on a machine that was busy with other work, else empty."""
+    """A warning if times of ``points`` were measured on a machine that was busy with other work, else empty."""
     return under_load((point.load for point in points if point.status == "converged"), LOADED)
 
 
@@ -146,7 +146,7 @@ def left_out(case: CaseStudy) -> list[Point]:
 
 
 def front(case: CaseStudy, error: str) -> Drawing:
-    """Error against time, of one of the statistics shown."""
+    """Error against time for one of the statistics."""
     title = title_of(error).capitalize()
 
     def draw(figure: Figure, axes: Axes) -> None:
@@ -181,7 +181,7 @@ def _draw_answers(axes: Axes, found: Iterable[Answer]) -> None:
 
 
 def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
-    """Pairs of each point with its measured error, which may be below the truth's bar, and with the error that counts."""
+    """Pairs of each point with its measured error, which may be below the bar of the truth, and with the error that counts."""
     return [
         (replace(point, errors=point.errors or counted.errors), counted)
         for point, counted in zip(case.points, case.counted, strict=True)

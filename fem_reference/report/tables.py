@@ -32,10 +32,10 @@ SPREAD = (
 def summary(comparison: Comparison) -> dict[str, Any]:
     """Everything that was measured, as valid JSON: a number that is not finite is None.
 
-    ``measures`` has each candidate's deviation from the reference, and under ``"reference"`` its own change from rest with the
-    forces and inversion numbers that its solver recorded; ``doubts``: the reasons to doubt the reference, in words; ``from_rest``:
-    the change from rest of every run, with its forces; ``error_bars``: those of the reference; ``rankings``: the solvers that the
-    bars separate, both empty without bars; ``unsound``: the reasons why the frames of candidates are no answer.
+    ``measures``: each candidate's deviation from the reference; under ``"reference"`` the reference's change from rest, with its
+    recorded forces and inversion numbers. ``doubts``: the reasons to doubt the reference, in words. ``from_rest``: the change from
+    rest of every run, with its forces. ``error_bars``: bars of the reference; ``rankings``: the solvers that the bars separate;
+    both are empty without bars. ``unsound``: the reasons why the frames of candidates are no answer.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
@@ -85,7 +85,7 @@ def known(comparison: Comparison) -> tuple[ErrorBar, ...]:
 
 
 def spread(comparison: Comparison) -> str:
-    """The sentence on what error bars of forces leave out; empty where none are known or no attachment is by springs."""
+    """The sentence on the part that error bars of forces leave out; empty without such bars or without springs."""
     forces = any(bar.metric == "joint_moment" for bar in known(comparison))
     return SPREAD if forces and any(one.stiffness is not None for one in comparison.setup.attached) else ""
 
@@ -97,7 +97,7 @@ def inversion(run: Run) -> tuple[Measure, ...]:
 
 
 def exerted(run: Run) -> tuple[Measure, ...]:
-    """The forces [N] and moments about the origin [N mm] on each bone that a solver recorded, as measures: their lengths, by the
+    """The forces [N] and moments about the origin [N mm] on each bone that a solver recorded, as measures: their magnitudes, by the
     name of the bone, and their components.
     """
     found = list[Measure]()

@@ -1,4 +1,4 @@
-"""The page of unknown parameters: bands of answers over the motion, sensitivities, and candidates beside the bands."""
+"""The page of unknown parameters: bands of results over the motion, sensitivities, and candidates compared with the bands."""
 
 import math
 from functools import partial
@@ -74,7 +74,7 @@ def _sentence(found: Uncertainty, band: Band) -> str:
 
 
 def ratio_of(band: Band) -> float | None:
-    """The width of a band over the error bar of the reference, None where one is not known."""
+    """The width of a band over the error bar of the reference, None if one is not known."""
     bar = band.greatest_bar
     return band.width / bar if bar > 0 and not math.isnan(band.width) else None
 
@@ -85,7 +85,7 @@ def beside(found: Uncertainty, candidate: str) -> dict[str, Placed]:
 
 
 def verdict(one: Placed | None, unit: str) -> tuple[str, str]:
-    """The verdict on a candidate beside a band, and its reason."""
+    """The verdict on a candidate compared with a band, and the reason."""
     if one is None or not one.word:
         return "\N{EN DASH}", ""
     frames = [place for place in one.places if place]
@@ -96,8 +96,8 @@ def verdict(one: Placed | None, unit: str) -> tuple[str, str]:
 
 
 def drawing(found: Uncertainty, band: Band) -> Drawing:
-    """A band over the frames, with the error bar of the reference and the candidates, each minus the case's own answer: otherwise
-    a band would often be too narrow to see.
+    """A band over the frames, with the error bar of the reference and the candidates. The result of the case is subtracted from
+    all, as a band would otherwise often be too narrow to see.
     """
     title = band.title if band.distance else f"{band.title}: difference from that of the case"
     return over_frames(f"band-{band.quantity}", title, band.unit, partial(_draw, found, band))

@@ -21,7 +21,7 @@ from fem_reference.report.words import duration, number, words
 _OF_ENTRY = ("name", "group", "title", "unit", "kind", "relative", "because", "source", "negative_control")
 _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
 PASS, FAIL = "#14713a", "#b3261e"
-LEAST, GREATEST = 1e-8, 1e3  # the range of shares of the tolerance in the overview; others are drawn at its edge
+LEAST, GREATEST = 1e-8, 1e3  # the range of shares of the tolerance in the overview; others are drawn at the edge
 _ROW = 0.175  # height of a row of the overview [in]
 
 
@@ -91,7 +91,7 @@ def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
 
 
 def share(one: Result) -> float:
-    """The error as a share of its bound, NaN where nothing was measured; infinite for an error where none is allowed."""
+    """The error as a share of its bound; NaN if nothing was measured, infinite for an error if no error is allowed."""
     if one.within > 0:
         return one.error / one.within
     return one.error * math.inf if one.error else 0.0
@@ -168,7 +168,7 @@ def drawable(one: Result) -> bool:
 
 
 def convergence(one: Result) -> Drawing:
-    """Error over mesh size on logarithmic axes, beside a line whose slope is the integer nearest to the measured order."""
+    """Error over mesh size on logarithmic axes, with a line whose slope is the integer nearest to the measured order."""
     sizes, errors = _errors(one)
     order = one.finding.order
 

@@ -38,7 +38,7 @@ from fem_reference.report.viewer_fields import NEAR, Fields, arrows, joints
 from fem_reference.runs.store import Run, at_numbers
 
 THREE = Path(__file__).parent / "three"
-# The most bytes of positions and levels of all frames before compression; compressed and in base64 they take about as many.
+# The most bytes of positions and levels of all frames before compression; compression and base64 together hardly change the size.
 BUDGET = 10_400_000
 BONE_TRIANGLES = 8000
 _LEVELS = 65535
@@ -66,11 +66,11 @@ class _Box:
 
 
 def view(comparison: Comparison, budget: int = BUDGET) -> dict[str, Any]:
-    """The contents of the template of the 3D view: the ``data`` for the script, the names of the ``candidates`` and ``quantities``,
-    the frame ``numbers``, the stride ``every`` of frames drawn (above 1 where positions would exceed ``budget`` bytes), the
-    greatest ``error`` of a coordinate [mm], the colours of fibres (``warm``) and the places of ``stretches`` on their scale [%],
-    the greatest ``force`` drawn [N], 0 without any, True for ``attached`` or ``touched`` vertices, the distance ``near`` [mm] of
-    the latter, and ``version`` and ``licence`` of the library.
+    """The contents of the template of the 3D view. ``data``: for the script; ``candidates``, ``quantities``: their names.
+    ``numbers``: frame numbers. ``every``: the stride of frames drawn, above 1 if positions would exceed ``budget`` bytes.
+    ``error``: the greatest error of a coordinate [mm]. ``warm``: the colours of fibres; ``stretches``: places on their scale [%].
+    ``force``: the greatest force drawn [N], 0 without forces. ``attached``, ``touched``: True with such vertices; ``near``: the
+    distance [mm] of touched vertices. ``version``, ``licence``: of the library.
     """
     shown = [comparison.reference, *(run for run in comparison.candidates if run.has_surface)]
     every = _every(shown, budget)
@@ -100,7 +100,7 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
     frames = {run.name: _frames(run, numbers) for run in shown}
     own = np.concatenate(
         [reference.surface.points[None], frames[reference.name]]
-    )  # not empty even if no frame was reached
+    )  # not empty, even if no frame was reached
     box = _box(own, list(frames.values()))
     fields = Fields(comparison, shown, numbers)
     runs, top = _runs(frames, reference.name, box)
@@ -144,7 +144,7 @@ def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:
 
 
 def _every(shown: list[Run], budget: int) -> int:
-    """The stride of frames that keeps the positions of all runs within ``budget`` bytes, but leaves two frames."""
+    """The stride of frames that keeps the positions of all runs within ``budget`` bytes, with at least two frames."""
     count, vertices = len(shown[0].numbers), len(shown[0].surface.points)
     frame = len(shown) * vertices * (3 * 2 + 2)  # a vertex: three coordinates of two bytes, two quantities of one byte
     strides = range(1, max(count, 2))
@@ -152,13 +152,13 @@ def _every(shown: list[Run], budget: int) -> int:
 
 
 def _frames(run: Run, numbers: tuple[int, ...]) -> Floats:
-    """Positions (f, n, 3) of a run at frame ``numbers``; all NaN in a frame that is not wholly known."""
+    """Positions (f, n, 3) of a run at frame ``numbers``; all NaN in a frame that is not completely known."""
     known = np.isfinite(run.positions).all(axis=(1, 2), keepdims=True)
     return at_numbers(run, np.where(known, run.positions, np.nan), numbers)
 
 
 def _box(reference: Floats, runs: list[Floats]) -> _Box:
-    """The box around all frames, cut off at one length of the reference's box beyond it on each side, as a run may scatter."""
+    """The box around all frames, as a run may scatter at most one length larger on each side than the box of the reference."""
     low, high = _bounds(reference)
     reach = float(np.linalg.norm(high - low))
     lows, highs = zip(*(_bounds(frames) for frames in [reference, *runs] if np.isfinite(frames).any()), strict=True)
@@ -174,7 +174,7 @@ def _stops(name: str) -> list[str]:
 
 
 def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> tuple[list[dict[str, Any]], float]:
-    """Every run, and the ``top`` of the colours: the greatest distance to the reference in a frame that is wholly in the box."""
+    """Every run, and the ``top`` of the colours: the greatest distance to the reference in a frame that is entirely in the box."""
     rows, top = [], 0.0
     for name, positions in frames.items():
         inside = ((positions >= box.low - box.step) & (positions <= box.low + (_LEVELS + 1) * box.step)).all(axis=2)
@@ -196,7 +196,7 @@ def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> tuple[list[di
 
 
 def _last_finite(frames: Floats) -> Floats:
-    """The frames, with each that was not reached replaced by the last reached one before it, so that it costs no bytes."""
+    """The frames; a frame that was not reached is replaced by the last reached frame before it, so that it takes no bytes."""
     reached = np.isfinite(frames).all(axis=(1, 2))
     last = np.maximum.accumulate(np.where(reached, np.arange(len(frames)), 0))
     return np.asarray(frames[last])

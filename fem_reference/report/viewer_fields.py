@@ -74,14 +74,14 @@ class Fields:
 
     @cached_property
     def gaps(self) -> dict[str, Floats | None]:
-        """Distances (f, n) [mm] to the bones by name of the run, NaN where a vertex is exempt; None where a bone has no inside."""
+        """Distances (f, n) [mm] to the bones by name of the run, NaN if a vertex is exempt; None if a bone has no inside."""
         found = {run.name: (run, local_fields.to_bones(run, self.context)) for run in self.runs}
         return {
             name: None if gaps is None else at_numbers(run, gaps, self.numbers) for name, (run, gaps) in found.items()
         }
 
     def touched(self, run: Run) -> NDArray[np.bool_] | None:
-        """True (f, n) for vertices within ``NEAR`` of a bone and not attached; None where that is not known."""
+        """True (f, n) for vertices within ``NEAR`` of a bone and not attached; None if distances are not known."""
         gaps = self.gaps[run.name]
         return None if gaps is None else np.less_equal(gaps, NEAR)  # False for NaN
 
@@ -98,14 +98,14 @@ class Fields:
         return {name: values for name, values in found.items() if values}
 
     def quantities(self) -> list[dict[str, Any]]:
-        """The quantities that can be chosen, besides the distance to the same vertex, which follows from the positions."""
+        """The quantities that can be chosen, except the distance to the same vertex, which follows from the positions."""
         return [
             {"name": name, "signed": name == "surface", "top": _top(list(values.values()))}
             for name, values in self.surfaces.items()
         ]
 
     def levels(self, run: Run) -> dict[str, bytes]:
-        """The bytes of a run by quantity; 0 where it is not known."""
+        """The bytes of a run by quantity; 0 if it is not known."""
         found = {}
         for name, values in self.surfaces.items():
             if run.name in values:
@@ -134,7 +134,7 @@ class Fields:
         return found
 
     def fibres(self, points: list[Floats]) -> dict[str, Any]:
-        """The lines, and the least and greatest stretch of a piece of these at ``points`` (f, m, 3) [mm] of each run."""
+        """The lines, and the least and greatest stretch of a piece of them at ``points`` (f, m, 3) [mm] of each run."""
         lines, ends = self.lines[0], self.lines[0].offsets
         # A piece joins a point of a line to the next one.
         inside = np.delete(np.arange(max(len(lines.points) - 1, 0)), ends[1:-1] - 1)
@@ -165,7 +165,7 @@ def joints(bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> list[dict[str, 
 
 
 def arrows(run: Run, setup: Setup, numbers: tuple[int, ...]) -> list[list[list[float]]]:
-    """Point of application (3) [mm] and force (3) [N] of each bone with a force, by frame; none where it is 0 or not known."""
+    """Point of application (3) [mm] and force (3) [N] of each bone with a force, by frame; none if the force is 0 or not known."""
     found = dict[int, list[list[float]]]()
     for i, number in enumerate(run.numbers):
         if number in numbers and (pull := forces.block(run, setup, i)) is not None:

@@ -43,8 +43,8 @@ def duration(seconds: float | None) -> str:
 
 
 def under_load(shares: Iterable[float], most: float) -> str:
-    """A warning where other processes kept more than the share ``most`` of the machine busy while times were measured; a share of
-    NaN is unknown.
+    """A warning if other processes kept more than the share ``most`` of the machine busy while times were measured; a share of NaN
+    is unknown.
 
     >>> under_load([0.02, 0.5, 0.25], 0.1)
     '2 of 3 times were measured while other processes kept 25 % to 50 % of the machine busy: undisturbed runs take less time'
@@ -61,7 +61,7 @@ def under_load(shares: Iterable[float], most: float) -> str:
 
 
 def ratio(one: float | None, other: float | None) -> float | None:
-    """One time over another, None where one of them is not known or zero.
+    """The ratio of two times, None if one of them is not known or zero.
 
     >>> ratio(100.0, 0.5), ratio(None, 1.0)
     (200.0, None)

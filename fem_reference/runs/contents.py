@@ -1,19 +1,19 @@
-"""The contents of run.json as a record, read strictly: a damaged file is refused as a whole."""
+"""The contents of run.json as a record, read strictly: a damaged file is refused entirely."""
 
 import json
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, ConfigDict, Field
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.records import Name, Record, increasing
+from fem_reference.foundations.records import Name, Record, increasing, rule
 from fem_reference.io import files, texts
 from fem_reference.scenes.muscle import LAST_FRAME, MOST_FRAMES
 
@@ -63,15 +63,15 @@ class Contents(Record):
     origin: Origin
     parts: tuple[str, ...]
 
-    @model_validator(mode="after")
-    def _check_scalars(self) -> Self:
-        if any(len(values) != len(self.numbers) for values in self.scalars.values()):
-            raise ValueError("as many values of each of the scalars as there are numbers of frames")
-        return self
+    _check_scalars = rule(
+        lambda one: all(len(values) == len(one.numbers) for values in one.scalars.values()),
+        "as many values of each of the scalars as there are numbers of frames",
+    )
 
 
 def frame_file(number: float, suffix: str) -> str:
-    """The name of a file of the frame with a ``number``; ValueError where it is not whole, as two frames would share a file.
+    """The name of a file of the frame with a ``number``; ValueError if the number is not an integer, as two frames would share a
+    file.
 
     >>> frame_file(10, ".vtp")
     'frame_0010.vtp'
@@ -94,7 +94,7 @@ def vector_scalars(name: str, vector: Floats) -> dict[str, float]:
 
 
 def vector_names(scalars: Mapping[str, Floats], kind: str) -> list[str]:
-    """The names whose vectors of a ``kind`` have their components in ``scalars``.
+    """The names for which ``scalars`` contains the components of a vector of a ``kind``.
 
     >>> vector_names(dict.fromkeys(vector_scalars("force_on_femur", np.zeros(3))), "force_on_")
     ['femur']
@@ -103,7 +103,7 @@ def vector_names(scalars: Mapping[str, Floats], kind: str) -> list[str]:
 
 
 def scalar_vectors(scalars: Mapping[str, Floats], kind: str, name: str) -> Floats:
-    """The vectors (f, 3) of a ``kind`` from the components in ``scalars``; InputError where ``name`` has none."""
+    """The vectors (f, 3) of a ``kind`` from the components in ``scalars``; InputError if ``name`` has none."""
     keys = [f"{kind}{name}_{axis}" for axis in "xyz"]
     if not set(keys) <= set(scalars):
         known = ", ".join(vector_names(scalars, kind))
@@ -113,7 +113,7 @@ def scalar_vectors(scalars: Mapping[str, Floats], kind: str, name: str) -> Float
 
 
 def point(centre: ArrayLike) -> Floats:
-    """The point (3,) [mm] that a ``centre`` is; InputError unless it is three finite numbers."""
+    """A ``centre`` as a point (3,) [mm]; InputError unless it is three finite numbers."""
     try:
         found = np.asarray(centre, float)
     except (TypeError, ValueError, OverflowError):

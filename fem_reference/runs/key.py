@@ -14,9 +14,9 @@ from fem_reference.foundations import version
 from fem_reference.foundations.version import __version__
 
 PACKAGE = Path(__file__).parent.parent
-# An import as a formatter writes it, over several lines only in brackets. Parsing imports alone takes a sixth of the time.
+# An import in the style of a formatter: over several lines only in brackets. Parsing imports alone takes a sixth of the time.
 _IMPORT = re.compile(rb"^[ \t]*((?:from [\w.]+ )?import (?:\([^)]*\)|[^\n(]+))", re.MULTILINE)
-# Code that makes problems from scenes determines every run; some of it is found by name at run time, not by imports.
+# Code that makes problems from scenes determines every run; some modules of it are found by name at run time, not by imports.
 _BEFORE = ("foundations", "io", "effects", "geometry", "scenes", "problems")
 _MADE_WITH = (
     "numpy",
@@ -48,7 +48,9 @@ def code_hash(solver: str, package: Path = PACKAGE) -> str:
 
 
 def sources(solver: str, package: Path = PACKAGE) -> set[Path]:
-    """The files that determine the runs of ``solver``: packages that make problems, and its own modules with all their imports."""
+    """The files that determine the runs of ``solver``: packages that make problems, and the solver's modules with all their
+    imports.
+    """
     found = {path for name in _BEFORE for path in _files(package / name)}
     waiting = _module(package, ["solvers", solver]) | {path for path in found if path.suffix == ".py"}
     while waiting:
@@ -76,7 +78,7 @@ def imported(path: Path, package: Path) -> tuple[str, ...]:
 
 
 def _tree(source: bytes) -> ast.AST:
-    """The syntax tree of the imports of a ``source``; of all of it where a text that looks like an import is not one."""
+    """The syntax tree of the imports of a ``source``; of the entire source if a text only looks like an import."""
     try:
         return ast.parse(b"\n".join(_IMPORT.findall(source)))
     except SyntaxError:
@@ -89,7 +91,9 @@ def machine() -> str:
 
 
 def made_with(manner: str = "") -> dict[str, str]:
-    """Provenance of a measurement: our version, the machine, the ``manner`` in which runs used it, and versions of packages."""
+    """Provenance of a measurement: our version, the machine, the ``manner`` in which runs used the machine, and versions of
+    packages.
+    """
     described = ", ".join(filter(None, [machine(), manner]))
     return {"fem_reference": __version__, "machine": described, **versions()}
 
@@ -105,7 +109,7 @@ def _files(folder: Path) -> set[Path]:
 
 def _module(package: Path, parts: list[str]) -> set[Path]:
     """The files of the module ``parts`` below ``package``, and of the packages around it except the outermost, which only lists
-    public names; for a solver in a folder, the whole folder. Empty where there is no such module.
+    public names; for a solver in a folder, the whole folder. Empty if there is no such module.
     """
     place = package.joinpath(*parts)
     if place.is_dir():

@@ -39,15 +39,15 @@ NAMES = (
     "von_mises",
     "fibre_stress",
 )
-# A point counts as outside the tets if its distance from them exceeds this share of the mesh's diagonal; less may be rounding.
+# A point counts as outside the tets if its distance from them exceeds this share of the mesh's diagonal; less is rounding.
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """The ``states`` by frame number of a muscle that fills ``mesh``, with its ``effects``. ``fibre`` (m, 3): the unit vector
-    along the fibres at the middle of each tet, where known; the solver uses directions at quadrature points, which differ from
-    these by 2 degrees, root mean square, in a bar of 6 mm tets. ``regions``: by name those in which effects act.
+    """The ``states`` by frame number of a muscle that fills ``mesh``, with its ``effects``. ``fibre`` (m, 3) is the unit vector
+    along the fibres at the middle of each tet, if known. The solver uses directions at quadrature points; in a bar of 6 mm tets
+    these differ by 2 degrees (rms). ``regions``: the regions in which effects act, by name.
     """
 
     mesh: TetMesh
@@ -65,12 +65,12 @@ class Results:
         """Results by name at ``points`` (n, 3) [mm] of the rest state, at one of the frame numbers ``frames``.
 
         ``names``, by default all that exist, are among ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3),
-        ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], that of the mixed form, positive where the volume
-        grows; ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa]; and
-        ``fibre_stress`` (n,) [MPa] along the present fibre. InputError where the run lacks such a frame or result.
+        ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], the mixed unknown, positive where the volume grows;
+        ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa]; and ``fibre_stress``
+        (n,) [MPa] along the present fibre. InputError if the run lacks the frame or the result.
 
-        A point outside the tetrahedra has NaN everywhere. F and the stress jump between tetrahedra: at a shared point
-        they are those of one tetrahedron. Where det F is not positive the stress is NaN.
+        A point outside the tetrahedra has NaN everywhere. F and the stress jump between tetrahedra: a shared point has the values
+        of one tetrahedron. The stress is NaN where det F is not positive.
         """
         wanted = self._checked(names, self._state(frame))
         found = np.asarray(points, float)
@@ -100,8 +100,9 @@ class Results:
         return {name: np.concatenate([part[name] for part in parts]) for name in wanted}
 
     def energies(self, frame: float) -> dict[str, float]:
-        """The energy [N mm] of each effect that has one, by its name in scene files, at one of the frame numbers ``frames``. By
-        virtual work, its share of a moment is minus the slope of its energy in the angle. Contact and springs are left out.
+        """The energy [N mm] of each effect that has an energy, by its name in scene files, at one of the frame numbers ``frames``.
+        The share of an effect in a moment is minus the derivative of its energy with respect to the angle. Contact and springs are
+        left out.
         """
         state, (rule, shares), found = self._state(frame), _rule(), dict[str, float]()
         acting = [(effect, effect.amount(frame)) for effect in self.effects]
@@ -131,7 +132,7 @@ class Results:
         return there if names is None else tuple(names)
 
     def _state(self, frame: float) -> NodalState:
-        """The state at a ``frame``; InputError where there is none, or it has other tetrahedra."""
+        """The state at a ``frame``; InputError if there is no state, or it has other tetrahedra."""
         if frame not in self.states:
             raise InputError("frame", f"{frame:g}", f"one of {', '.join(f'{number:g}' for number in self.frames)}")
         state, m = self.states[frame], len(self.mesh.tets)
@@ -149,8 +150,8 @@ class Results:
 
 
 def of_run(folder: Path | str, case: str | Path | Case) -> Results:
-    """The results of the run in ``folder``, which belongs to ``case``: a name, a folder, or the case with the changes
-    that it was solved with. InputError where there is no run with states, or it is of another case.
+    """The results of the run in ``folder``, which belongs to ``case``: a name, a folder, or the case with the changes of that run.
+    InputError if there is no run with states, or the run is of another case.
     """
     folder = Path(folder)
     run = store.load(folder)
@@ -182,7 +183,7 @@ class _Places:
         return np.asarray(np.einsum("na,nai->ni", self.functions, inside)), np.eye(3) + gradient
 
     def _pressure(self, of_cells: Floats) -> Floats | None:
-        """A pressure (n,) [MPa] from that of cells (m, l), None where the element has none."""
+        """The pressure (n,) [MPa] from its values in cells (m, l), None if the element has no pressure."""
         inside = of_cells[self.tets]
         if inside.shape[1] == 0:
             return None
@@ -280,8 +281,8 @@ def von_mises(stress: Floats) -> Floats:
 
 def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats, Floats]:
     """The Lagrange functions (n, count) of a tetrahedron at ``barycentric`` coordinates L (n, 4), and their gradients
-    (n, count, 3) [1/mm] from the ``gradients`` (n, 4, 3) of the coordinates; the ``count`` is of 4 or 10 nodes, in the
-    order of ``body.reference_nodes``.
+    (n, count, 3) [1/mm] from the ``gradients`` (n, 4, 3) of the coordinates. ``count`` is 4 or 10; the nodes are in the order of
+    ``body.reference_nodes``.
 
     Of degree 2: ``L_i (2 L_i - 1)`` at corners, ``4 L_i L_j`` between two (Zienkiewicz and Taylor 2000, The Finite
     Element Method, vol. 1, 8.12).
@@ -293,7 +294,7 @@ def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats
     i, j = (
         near.argmax(axis=1),
         3 - near[:, ::-1].argmax(axis=1),
-    )  # the two corners that each node is between; for a corner, itself twice
+    )  # the two corners on either side of each node; for a corner, the corner twice
     at_corner, scale = np.where(i == j, 1.0, 0.0), np.where(i == j, 2.0, 4.0)
     one, other = barycentric[:, i], barycentric[:, j]
     slopes = scale[:, None] * (one[..., None] * gradients[:, j] + other[..., None] * gradients[:, i])

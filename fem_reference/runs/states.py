@@ -33,13 +33,14 @@ _IN_SITU = ("response", "response_pressure")
 
 @dataclass(frozen=True, eq=False)
 class NodalState:
-    """The unknowns of m cells: ``displacement`` (m, k, 3) [mm] at the k nodes of the element in the order of
-    ``body.reference_nodes``; ``pressure`` (m, l) [MPa] at the corners (l = 4 of a tetrahedron), constant in the cell (l = 1),
-    or none (l = 0).
+    """The unknowns of m cells. ``displacement`` (m, k, 3) [mm] is given at the k nodes of the element, in the order of
+    ``body.reference_nodes``. ``pressure`` (m, l) [MPa] is given at the corners (l = 4 in a tetrahedron), is constant in the cell (l
+    = 1), or absent (l = 0).
 
-    Where an effect depends on velocities, also the displacement ``before`` (m, k, 3) [mm] at the start of the last load step, and
-    the inverse ``rate`` [1/s] of its duration; else (0, 0, 3) and 0. Of a body in situ, also the ``response`` (m, k, 3) [mm] and
-    ``response_pressure`` (m, l) [MPa] that give its stress at rest (``effects.in_situ``); else (0, 0, 3) and (0, 0).
+    If an effect depends on velocities, ``before`` (m, k, 3) [mm] is the displacement at the start of the last load step, and
+    ``rate`` [1/s] is 1 over the duration of this step; otherwise they are (0, 0, 3) and 0. For a body in situ, ``response`` (m, k,
+    3) [mm] and ``response_pressure`` (m, l) [MPa] give the stress at rest (``effects.in_situ``); otherwise they are (0, 0, 3) and
+    (0, 0).
     """
 
     displacement: Floats
@@ -56,7 +57,7 @@ class NodalState:
 
     @classmethod
     def of(cls, arrays: Mapping[str, ArrayLike]) -> "NodalState":
-        """The state of ``arrays`` by name; KeyError where one is missing."""
+        """The state of ``arrays`` by name; KeyError if one is missing."""
         displacement, pressure, before, rate = (np.asarray(arrays[name], float) for name in _ARRAYS)
         own = {name: np.asarray(arrays[name], float) for name in _IN_SITU if name in arrays}
         return cls(displacement, pressure, before, float(rate), **own)
@@ -74,12 +75,12 @@ def write(folder: Path, frame: float, state: NodalState) -> None:
 
 
 def are_kept(folder: Path, frames: tuple[int, ...]) -> bool:
-    """True where the run in ``folder`` keeps its states at all ``frames``."""
+    """True if the run in ``folder`` keeps its states at all ``frames``."""
     return all(path.is_file() for path in (folder / FOLDER / "rest.npz", *(_place(folder, frame) for frame in frames)))
 
 
 def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
-    """The mesh and the fibre directions (m, 3) of the states in a run's ``folder``; InputError where there are none."""
+    """The mesh and the fibre directions (m, 3) of the states in a run's ``folder``; InputError if there are none."""
     place = folder / FOLDER / "rest.npz"
     if not place.is_file():
         raise InputError(folder, "a run without states", "one of the reference, solved with store_state = true")
@@ -132,7 +133,9 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
 
 
 def read_arrays(path: Path, names: tuple[str, ...] = (), also: tuple[str, ...] = ()) -> Arrays:
-    """The arrays ``names`` (by default all) of an .npz file, and those of ``also`` that exist; InputError where it is damaged."""
+    """The arrays ``names`` (by default all) of an .npz file, and any arrays of ``also`` that exist; InputError if the file is
+    damaged.
+    """
     try:
         with path.open("rb") as file:
             with zipfile.ZipFile(file) as members:
@@ -150,8 +153,8 @@ def read_arrays(path: Path, names: tuple[str, ...] = (), also: tuple[str, ...] =
 @dataclass(frozen=True, eq=False)
 class NodalField:
     """Arrays by name at the nodes of ``mesh``: ``psi`` (N,) at the vertices, then for elements of order 2 at the middles of
-    ``mesh.edges``. ``components`` (n, d) at the vertices: the vector whose norm is psi, where a solver computes one.
-    ``form``: the weak form that was solved. After a failure psi is NaN.
+    ``mesh.edges``. ``components`` (n, d) at the vertices: the vector whose norm is psi, if the solver computes it. ``form``: the
+    weak form that was solved. After a failure psi is NaN.
     """
 
     mesh: FieldMesh
@@ -168,7 +171,7 @@ def write_field(path: Path, field: NodalField) -> None:
 
 
 def read_field(folder: Path, numbers: tuple[int, ...]) -> tuple[FieldMesh, dict[str, Floats]]:
-    """The mesh of the run in ``folder``, and by name its arrays (f, ...) over frames; InputError where a file is damaged."""
+    """The mesh of the run in ``folder``, and by name its arrays (f, ...) over frames; InputError if a file is damaged."""
     frames = []
     for number in numbers:
         path = folder / FIELD / frame_file(number, ".npz")
@@ -182,7 +185,7 @@ def read_field(folder: Path, numbers: tuple[int, ...]) -> tuple[FieldMesh, dict[
 
 
 def _check_field(arrays: dict[str, Any], first: dict[str, Any], path: Path) -> None:
-    """Raise InputError where a frame's arrays are not those of a field, or belong to another mesh than the ``first``."""
+    """Raise InputError if the arrays of a frame are not a field, or belong to another mesh than the ``first`` frame."""
     points, cells, values = arrays["points"], arrays["cells"], arrays[VALUES]
     found = {name: (array.shape, array.dtype.kind) for name, array in arrays.items()}
     usable = (

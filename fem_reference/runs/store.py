@@ -3,10 +3,10 @@
 <store>/<solver>-<key>/run.json        status, cost, provenance, numbers per frame
                       /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
                       /rest/           surface.vtp and fibres.vtp at rest, for a solver that moves no surface
-                      /fibres.pvd      fibre polylines, where the solver has an interior
-                      /tets.pvd        tetrahedra, where the solver has them
+                      /fibres.pvd      fibre polylines, if the solver has an interior
+                      /tets.pvd        tetrahedra, if the solver has them
                       /field.pvd       a scalar field on its mesh, for a scalar problem (``states``)
-                      /state/          the unknowns of the tetrahedra, where requested (``states``)
+                      /state/          the unknowns of the tetrahedra, if requested (``states``)
                       /restart/        of an unfinished run: the state from which its solver continues (``writer``)
 """
 
@@ -37,20 +37,20 @@ from fem_reference.scenes.case import Part
 class Frame:
     """One requested frame, by its ``number``, with the parts that the solver has.
 
-    ``surface`` (n, 3), ``fibres`` (m, 3) and ``points`` (k, 3) [mm]: positions of the surface's vertices, of the fibres' points
-    and of the mesh's nodes, (0, 3) without cells. ``forces`` (3,) [N] by name of each constraint, along its prescribed
-    components, and their ``moments`` (3,) [N mm] about the origin (where several regions prescribe the same component at a node,
-    each of them counts its force); also those of obstacles. ``state``: the unknowns of the cells, where requested. ``field``: that
-    of a scalar problem. ``residuals``: the norms [N, mm3] before and after each Newton iteration of the last load step.
-    ``note``: the text that progress shows for the frame.
+    ``surface`` (n, 3), ``fibres`` (m, 3) and ``points`` (k, 3) [mm]: positions of the surface's vertices, of the fibres' points and
+    of the mesh's nodes, (0, 3) without cells. ``forces`` (3,) [N]: the force of each constraint (along its prescribed components)
+    and obstacle, by name. ``moments`` (3,) [N mm]: the moments of these forces about the origin. If several regions prescribe a
+    component at a node, each includes its force. ``state``: the unknowns of the cells, if requested. ``field``: the field of a
+    scalar problem. ``residuals``: the norms [N, mm3] before and after each Newton iteration of the last load step. ``note``: the
+    text that progress shows for the frame.
 
     ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, stored energy [N mm], newton_iterations,
-    cut_backs. Of the reference also, where all energy is stored, energy_gap since the last frame (``solvers/fenicsx/path``; of
-    muscles by Simpson's rule where the trapezoidal rule is poor); where the tangent is symmetric, negative_modes and, of those,
-    material_modes (``solvers/fenicsx/stability``); min_cell_volume_ratio and max_cell_volume_ratio, extremes of the means over
-    cells, and where a law limits the fibre stretch min_cell_fibre_stretch and max_cell_fibre_stretch; outside_law, the number of
-    cells in which a law is outside its range; with contact the greatest contact_depth [mm] and contact_pressure [MPa] and the
-    contact_area at rest [mm2]; of a muscle the stresses of ``stress_statistics``, as stress_von_mises_p95 [MPa].
+    cut_backs. The reference adds, for means over cells, min_cell_volume_ratio and max_cell_volume_ratio and, if a law limits the
+    fibre stretch, min_cell_fibre_stretch and max_cell_fibre_stretch. outside_law is the number of cells outside the range of a law.
+    If all energy is stored, energy_gap is the gap since the last frame (``solvers/fenicsx/path``; for muscles by Simpson's rule if
+    the trapezoidal rule is poor). If the tangent is symmetric, negative_modes are counted, and material_modes among them
+    (``solvers/fenicsx/stability``). With contact there are the greatest contact_depth [mm] and contact_pressure [MPa], and
+    contact_area at rest [mm2]; for a muscle the stresses of ``stress_statistics``, such as stress_von_mises_p95 [MPa].
     """
 
     number: float
@@ -88,11 +88,11 @@ class Outcome:
 class Run:
     """Frames that a solver produced for a problem: the muscle or the scalar field of a case, or a body.
 
-    ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions`` (f, m, 3)
-    [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver that moves only lines has
-    no surface: ``has_surface`` is False, and all ``positions`` are NaN. A scalar run has a ``mesh`` instead, and ``fields`` by
-    name (f, ...) at its nodes, as in :class:`NodalField`. ``states``: the full frames in memory; for a body they are the whole run.
-    ``body``, ``settings``: the problem, for error bars of a body. ``residuals`` by frame. ``others``: other muscles' runs by name.
+    ``numbers`` (f,): frame numbers. ``positions`` (f, n, 3) [mm]: vertices of ``surface``, which is at rest. ``fibre_positions``
+    (f, m, 3) [mm]: points of ``fibres``, None for a surface-only solver. ``scalars`` (f,) by name. A solver that moves only lines
+    has no surface: ``has_surface`` is False, and all ``positions`` are NaN. A scalar run has a ``mesh`` instead, and ``fields`` (f,
+    ...) by name at its nodes, as in :class:`NodalField`. ``states``: all frames in memory, the full run of a body. ``body``,
+    ``settings``: the problem, for error bars of a body. ``residuals`` by frame. ``others``: the runs of the other muscles by name.
     """
 
     name: str
@@ -117,7 +117,7 @@ class Run:
 
     @property
     def last(self) -> Frame:
-        """The last frame of a run in memory; ArithmeticError with the reason where some were not reached."""
+        """The last frame of a run in memory; ArithmeticError with the reason if some frames were not reached."""
         if self.outcome.status != "converged":
             raise ArithmeticError(f"{self.outcome.status}: {self.outcome.message}")
         return self.states[-1]
@@ -147,7 +147,7 @@ class Run:
         return self.values[:, : len(self.points)]
 
     def force(self, bone: str) -> Floats:
-        """The force (f, 3) [N] of the muscle on a ``bone``, by attachments and contact; InputError where none is known."""
+        """The force (f, 3) [N] of the muscle on a ``bone``, by attachments and contact; InputError if it is not known."""
         return scalar_vectors(self.scalars, "force_on_", bone)
 
     def moment(self, bone: str, centre: ArrayLike = (0.0, 0.0, 0.0)) -> Floats:
@@ -168,7 +168,7 @@ class Run:
 
 
 def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING) -> Run:
-    """The run in memory with ``frames``; its arrays are those that all frames have. ``rest``: the shapes at rest."""
+    """The run in memory with ``frames``, and with the arrays that all frames have. ``rest``: the shapes at rest."""
     states = tuple(frames)
 
     def stacked(name: str) -> Floats | None:
@@ -197,7 +197,7 @@ def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING)
 
 
 def load(folder: Path) -> Run:
-    """The run in ``folder``; InputError where there is no run, it was cut off, or one of its files is damaged."""
+    """The run in ``folder``; InputError if there is no run, if it was cut off, or if one of its files is damaged."""
     place = folder / "run.json"
     state = texts.read_json(place, "the run.json of a stored run")
     if isinstance(state, dict) and state.get("status") == "running":
@@ -235,14 +235,14 @@ def _moved(folder: Path, numbers: tuple[int, ...], parts: Collection[str]) -> di
 
 
 def _check_same(folder: Path, names: list[str], frames: list[Floats], rest: Floats) -> None:
-    """Raise InputError where a frame has another number of points than the run at rest."""
+    """Raise InputError if a frame has another number of points than the run at rest."""
     for name, points in zip(names, frames, strict=True):
         if len(points) != len(rest):
             raise InputError(folder / name, f"{len(points)} points", f"{len(rest)}, as in the rest state of the run")
 
 
 def status(folder: Path) -> str:
-    """The status in the ``run.json`` of a run in ``folder``; ``"running"`` where it was cut off, or ``"damaged"``."""
+    """The status in the ``run.json`` of a run in ``folder``; ``"running"`` if it was cut off, or ``"damaged"``."""
     try:
         return str(texts.read_json(folder / "run.json", "a run")["status"])
     except (InputError, KeyError, TypeError):
@@ -259,7 +259,7 @@ def finished(folder: Path, ended: Collection[str] = ("converged",)) -> Run | Non
 
 
 def at_numbers(run: Run, values: Floats, numbers: tuple[int, ...]) -> Floats:
-    """The ``values`` (f, ...) of a run at frame ``numbers``, NaN where it has no such frame."""
+    """The ``values`` (f, ...) of a run at frame ``numbers``, NaN if it has no such frame."""
     rows, lost = dict(zip(run.numbers, values, strict=True)), np.full(values.shape[1:], np.nan)
     return np.stack([rows.get(number, lost) for number in numbers])
 
@@ -280,9 +280,8 @@ def complete(run: Run, numbers: tuple[int, ...]) -> Run:
 
 
 def seconds_per_frame(run: Run) -> float | None:
-    """Time [s] to solve one reached frame after the first; None where the run was computed elsewhere and no time is given.
-
-    ``seconds_solve`` is a solver's own time without compiling and writing; without it the whole wall time counts.
+    """Time [s] to solve one reached frame after the first; None if the run was computed elsewhere and no time is given.
+    ``seconds_solve`` is a solver's time without compiling and writing; without this entry the full wall time counts.
     """
     cost = run.outcome.cost
     seconds = cost.get("seconds_solve", cost.get("seconds"))
@@ -294,6 +293,6 @@ def seconds_per_frame(run: Run) -> float | None:
 
 
 def reached(run: Run) -> int:
-    """The number of frames with positions of the surface, or of the fibres where there is no surface."""
+    """The number of frames with positions of the surface, or of the fibres if there is no surface."""
     positions = run.positions if run.has_surface or run.fibre_positions is None else run.fibre_positions
     return int(np.isfinite(positions).all(axis=(1, 2)).sum())

@@ -1,4 +1,4 @@
-"""Frames and runs of one of several muscles, taken from those of all. Names of its scalars begin with its name and a dot."""
+"""Frames and runs of one of several muscles, taken from the common ones. Scalars of a muscle begin with its name and a dot."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -25,7 +25,9 @@ _OF_ALL = (
 
 
 def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
-    """The part of a ``frame`` of several muscles for one of them; a force on it by one of the ``others`` has the other's name."""
+    """The part of a ``frame`` of several muscles for one muscle; a force on it by one of the ``others`` has the name of that
+    muscle.
+    """
     assert frame.surface is not None  # frames of the reference have one
     assert frame.fibres is not None
     forces, moments = (
@@ -53,7 +55,7 @@ def force_between(name: str, other: str) -> str:
 
 
 def _own(key: str, name: str, others: tuple[str, ...]) -> str:
-    """The name of the force with a ``key`` in the run of the muscle ``name``; empty where it does not act on that muscle."""
+    """The name of the force with a ``key`` in the run of the muscle ``name``; empty if this force does not act on that muscle."""
     for other in others:
         if key == force_between(other, name):
             return other
@@ -61,7 +63,7 @@ def _own(key: str, name: str, others: tuple[str, ...]) -> str:
 
 
 def beside(runs: Mapping[str, Run]) -> dict[str, Run]:
-    """The ``runs`` of muscles by name, which have the same frames; each gets the other runs as its ``others``."""
+    """The ``runs`` of muscles by name, with the same frames; each run gets the other runs as its ``others``."""
     return {
         name: replace(run, others={other: one for other, one in runs.items() if other != name})
         for name, run in runs.items()
@@ -69,7 +71,7 @@ def beside(runs: Mapping[str, Run]) -> dict[str, Run]:
 
 
 def run_of(run: Run, problem: MusclesProblem, name: str) -> Run:
-    """The ``run`` of several muscles as one of the muscle of a ``name``, in memory."""
+    """The part of the ``run`` of several muscles for the muscle with a ``name``, in memory."""
     span, own = next(one for one in problem.spans if one.name == name), problem.problems[name]
     begin = f"{name}."
     scalars: dict[str, Floats] = {

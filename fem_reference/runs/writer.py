@@ -1,7 +1,7 @@
 """Runs written to disk while they are solved, frame by frame.
 
-Files are written atomically; ``run.json`` after the frame files that it names. A run with status ``running`` was cut off or
-crashed; it is not read as a result, and continues where its solver can.
+Files are written atomically, ``run.json`` after the frame files that it names. A run with status ``running`` was cut off or
+crashed; it is not read as a result, and continues if its solver can continue it.
 """
 
 import json
@@ -26,7 +26,7 @@ from fem_reference.runs.contents import FORMAT, Contents, RunJson, frame_file
 from fem_reference.runs.store import Frame, Outcome
 
 RESTART = "restart"
-# Statuses of a solve that was killed, alone or with the process that stores it, for example for lack of memory or disk space.
+# Statuses of a solve that was killed, alone or with the process that stores it, for example because memory or disk was full.
 ENDED_EARLY = ("running", "crashed")
 
 
@@ -39,7 +39,7 @@ class CutOff:
 
 
 def stored_before(folder: Path, identity: RunJson) -> RunJson | None:
-    """The run.json of a run in ``folder`` that was cut off and can continue as the one of ``identity``, if there is one."""
+    """The run.json of a run in ``folder`` that was cut off and can continue as the run of ``identity``, if there is one."""
     place = folder / "run.json"
     with suppress(InputError):
         state = texts.read_json(place, "a run")
@@ -96,12 +96,12 @@ QUIET = 1.0
 
 
 class Writer:
-    """Writes one run into ``folder``. It first empties the folder, except for a run that was cut off and can continue. ``add``
-    each frame, then ``close``. A frame that is already stored replaces the stored one and all after it.
+    """Writes one run into ``folder``. The folder is emptied first, unless it has a run that was cut off and can continue. Call
+    ``add`` for each frame, then ``close``. A frame with a stored number replaces the stored frame and all later frames.
     """
 
     def __init__(self, folder: Path, identity: RunJson, rest: AtRest = NOTHING, *, anew: bool = False) -> None:
-        """Begin a run of an ``identity``, the first keys of run.json; ``anew`` where its solver cannot continue a stored one."""
+        """Begin a run of an ``identity``, the first keys of run.json; ``anew`` if its solver cannot continue a stored run."""
         self.folder, self.rest = folder, rest
         self.state: RunJson = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
         self.state |= {"scalars": {}, "residuals": [], "cost": {}, "parts": []}
@@ -167,7 +167,7 @@ class Writer:
             clear(self.folder)
 
     def _write_unknowns(self, frame: Frame) -> bool:
-        """Write the unknowns of the tets; False where the frame has none."""
+        """Write the unknowns of the tets; False if the frame has none."""
         if self.rest.mesh is None or frame.state is None:
             return False
         if not self.frames:

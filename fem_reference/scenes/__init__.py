@@ -1,1 +1,1 @@
-"""Cases as frozen records, and how their files are read."""
+"""Cases as frozen records, and the reading of their files."""

@@ -1,6 +1,6 @@
 """The keys and behaviour of every case; cases of muscles and of scalar fields add keys of their own.
 
-``Case.key`` names a case by what determines its solution, the content of its files included.
+``Case.key`` identifies a case by everything that determines its solution, including the content of its files.
 """
 
 import hashlib
@@ -22,9 +22,9 @@ from fem_reference.foundations.records import FileName, Name, Record, join
 DATA_SETTING = "FEM_REFERENCE_DATA"
 # The setting with further folders, separated as in PATH, from which scene files may read files.
 ALLOWED_SETTING = "FEM_REFERENCE_FILES"
-COMMAND = "command"  # the solver that runs a program; a scene file cannot choose it
-DELAUNAY = "delaunay"  # the word that stands in place of the name of a file of triangles
-# Settings of solvers that change the time and not the answer.
+COMMAND = "command"  # the solver that runs a program; a scene file cannot choose this solver
+DELAUNAY = "delaunay"  # the word that replaces the name of a file of triangles
+# Settings of solvers that change the time but not the result.
 MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
 
 # Standards of a measurement: the reference (for itself, its rest state), the exact solution, or the run itself.
@@ -49,7 +49,7 @@ class SolverChoice(Record):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Every key but those that choose the solver."""
+        """Every key except the keys that choose the solver."""
         return dict(self.model_extra or {})
 
 
@@ -86,9 +86,9 @@ class NegativeControl(Record):
 
 class Case(Record):
     """A case, read and checked: the keys of its file, its ``name`` and its ``folder``. ``place`` names its file in messages;
-    ``from_file``: True where it has a file. ``quick``: changes by key with which it is solved faster and less accurately, as in
-    tests. ``unsolved``: why the reference ends before the last frame, if it does. ``decisions``: with ``effects = "auto"``, for
-    each effect of the file whether the case needs it, and why.
+    ``from_file``: True if it has a file. ``quick``: changes by key for a faster, less accurate solution, as in tests. ``unsolved``:
+    the reason why the reference ends before the last frame, if it does. ``decisions``: with ``effects = "auto"``, for each effect
+    of the file, whether the case needs it and why.
     """
 
     title: str
@@ -119,7 +119,7 @@ class Case(Record):
 
     @property
     def parts(self) -> "tuple[Case, ...]":
-        """The muscles of a case of several, each as a case of its own; none for any other case."""
+        """The muscles of a case of several, each as a separate case; none for any other case."""
         return ()
 
     def expecting(self, more: tuple[Expectation, ...]) -> Self:
@@ -178,7 +178,7 @@ class Case(Record):
         return path
 
     def _check_allowed(self, path: Path, place: str, text: str) -> None:
-        """Raise InputError where a scene file names a file that, links followed, is outside the folders that it may read."""
+        """Raise InputError if a scene file names a file that, links followed, is outside the folders that it may read."""
         if not self.from_file:
             return
         settings = os.pathsep.join(os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))
@@ -188,7 +188,7 @@ class Case(Record):
             raise InputError(place, f'"{text}", which is at {path.resolve()}', want)
 
     def check_solvers(self) -> None:
-        """Raise InputError where a scene file chooses the solver that runs a program."""
+        """Raise InputError if a scene file chooses the solver that runs a program."""
         candidates = ((f"candidate[{i}]", one) for i, one in enumerate(self.candidate))
         for key, one in (("reference", self.reference), *candidates):
             if self.from_file and one.solver == COMMAND:
@@ -207,13 +207,13 @@ class Case(Record):
         return [self.model_dump(include={*self.determined_by, "choice"}), self.effects, solved]
 
     def determining(self) -> dict[str, Any]:
-        """The keys that determine its solution, besides the effects."""
+        """The keys that determine the solution, besides the effects."""
         return self.model_dump(mode="json", include=set(self.determined_by))
 
     @property
     def key(self) -> str:
-        """A hash over everything that determines the solution: the keys of ``determined_by``, the effects, and the content of
-        the files that they name, wherever these are, and of the files of effects outside the package.
+        """A hash over everything that determines the solution: the keys of ``determined_by``, the effects, the content of the files
+        that they name, and of the files of effects outside the package.
         """
         tables = self.determining()
         tables["effect"] = [[type(effect).__name__, effect.model_dump(mode="json")] for effect in self.effects]
@@ -226,7 +226,7 @@ class Case(Record):
 
 
 def _exists(path: Path) -> bool:
-    """True where there is such a file or folder; False also for text that cannot be a path."""
+    """True if there is such a file or folder; False also for text that cannot be a path."""
     try:
         return path.exists()
     except (OSError, ValueError):  # a name that is too long or contains a null character

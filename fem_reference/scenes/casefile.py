@@ -61,7 +61,7 @@ def _scene_file(case: str | Path) -> Path:
 
 
 def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: bool = True) -> None:
-    """Change a key of a scene, or ``add`` one to a table that it has."""
+    """Change a key of a scene, or ``add`` a key to one of its tables."""
     *parents, last = numbers.parts(key)
     inside: Any = table
     try:
@@ -76,7 +76,7 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: boo
 
 
 def _near(table: dict[str, Any], parts: list[str | int]) -> str:
-    """The existing keys where ``parts`` of a key lead nowhere, as the end of a sentence."""
+    """The existing keys, for ``parts`` of a key that does not exist, as the end of a sentence."""
     inside: Any = table
     part: Any
     for i, part in enumerate(parts):
@@ -113,7 +113,7 @@ def read_muscle(case: str | Path, changes: dict[str, Any] | None = None) -> Musc
 
 
 def muscle(case: Case, place: str | None = None) -> MuscleCase:
-    """The ``case`` itself if it is one of a muscle; else InputError at ``place``, by default the file of the case."""
+    """The ``case`` itself if it is the case of a muscle; else InputError at ``place``, by default the file of the case."""
     if not isinstance(case, MuscleCase):
         kind = "a case of several muscles" if isinstance(case, MusclesCase) else "a scalar case"
         raise InputError(place or case.place, f'"{case.name}", {kind}', "the case of a muscle")
@@ -166,28 +166,17 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
     kind: type[Record]
     record, kind = (ScalarCase, FieldEffect) if "domain" in table else (MuscleCase, Effect)
     if isinstance(table.get("muscle"), list):
-        record, table = MusclesCase, table | {"muscle": _muscles(table["muscle"], place)}
+        several = [with_effects(one, join(place, f"muscle[{i}]")) for i, one in enumerate(table["muscle"])]
+        record, table = MusclesCase, table | {"muscle": several}
     for key in whose:
         if key in table:
             raise InputError(join(place, key), "an unknown key", f"one of {', '.join(keys(record))}")
-    if "effect" in table:
-        table = table | {"effect": effects(table["effect"], place, kind)}
-    case: Case = parse(record, table | whose, place)
+    case: Case = parse(record, with_effects(table, place, kind) | whose, place)
     runs = ["reference", "candidates", *(candidate.name for candidate in case.candidate)]
     check_once(runs, join(place, "candidate"))
     case.check_solvers()
     check_used(runs, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)], place)
     return _checked(case)
-
-
-def _muscles(entries: list[Any], place: str) -> list[Any]:
-    """The entries below the key ``muscle``, with the effects of each as records."""
-    return [
-        entry | {"effect": effects(entry["effect"], join(place, f"muscle[{i}]"))}
-        if isinstance(entry, dict) and "effect" in entry
-        else entry
-        for i, entry in enumerate(entries)
-    ]
 
 
 def with_numbers[C: Case](case: C, values: dict[str, float]) -> C:
@@ -207,19 +196,20 @@ def _checked[C: Case](case: C) -> C:
     return case
 
 
-def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
-    """The effects of a ``kind`` below the key ``effect``, each once; a value that is not a list is returned unchanged."""
+def with_effects(table: Any, place: str, kind: type[Record] = Effect) -> Any:
+    """The ``table`` with the effects of a ``kind`` below its key ``effect`` as records, each once; unchanged without a list."""
+    entries = table.get("effect") if isinstance(table, dict) else None
     if not isinstance(entries, list | tuple):
-        return entries
+        return table
     found = tuple(_effect(entry, join(place, f"effect[{i}]"), kind) for i, entry in enumerate(entries))
     names = [entry["name"] for entry in entries]
     _check_effects(names, found, place)
-    return found
+    return table | {"effect": found}
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
-    """Check that an effect acts once in each region (two of one name would share their unknowns), a load once on each part of the
-    surface, and that no bulk modulus is below the shear modulus of its region: that is usually a mistake in units.
+    """Check that an effect acts once in each region (two effects of one name would share their unknowns) and a load once on each
+    part of the surface, and that no bulk modulus is below the shear modulus of its region, which is usually a mistake in units.
     """
     places = [region_of(effect) for effect in effects]
     acting = [(name, getattr(effect, "on", ""), at) for name, effect, at in zip(names, effects, places, strict=True)]

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 from fem_reference.foundations.records import Record, directed, one_of
 from fem_reference.foundations.units import Angle, LengthUnit
 
-# Fibres of a template that is inclined more than this [rad] would all be shorter than the muscle is wide.
+# Fibres of a template that is inclined by more than this angle [rad] would all be shorter than the muscle is wide.
 _STEEPEST = math.radians(60)
 
 
@@ -35,7 +35,7 @@ class Traced(Record):
 
 class KohoutKukacka(Record):
     """Fibres of a ``template`` in the unit cube, mapped to ``contours`` of the Laplace field between the attachments ``start``
-    and ``end``; those of the template "pennate" are inclined by ``pennation`` in the direction ``towards`` across the muscle.
+    and ``end``; fibres of the template "pennate" are inclined by ``pennation`` in the direction ``towards`` across the muscle.
     """
 
     count: int = Field(gt=0, le=10_000)
@@ -58,7 +58,7 @@ class KohoutKukacka(Record):
 
 class Chmd(Record):
     """Fibres interpolated between fibres on the muscle's surface. ``heads``: a file for each head, with three or more fibres around
-    it. ``around``: without files, lines of the Laplace field just below the surface in their place.
+    it. ``around``: instead of files, lines of the Laplace field just below the surface.
     """
 
     count: int = Field(gt=0, le=1000)
@@ -78,8 +78,8 @@ class FibreTurn(Record):
 class Fibres(Record):
     """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced``, ``kohout_kukacka`` and ``chmd``.
 
-    ``turned``: a rotation, the same everywhere, from the directions of the lines to the fibre directions of the material; the
-    measured lengths remain those of the lines.
+    ``turned``: a rotation, the same everywhere, from the directions of the lines to the fibre directions of the material; lengths
+    are still measured along the lines.
 
     ``complete``: ends more than 2 mm from an attachment without a ``tendon`` are extended, in the muscle or along its surface, to
     the nearest point of the attachment.

@@ -17,10 +17,10 @@ from fem_reference.scenes.muscle import MuscleCase
 def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "case") -> Case:
     """Make a case from the keys and tables of a ``case.toml`` (``cases/hip_flexion/case.toml`` explains each), without a file.
 
-    A ``table`` with a ``domain`` is of a scalar field, any other of a muscle. Where files have text with a unit, numbers in
-    mm, N, MPa, s, rad and tonne are accepted too. Effects may be those of :func:`fem_reference.make_effect`. ``candidate``,
-    ``expect`` and ``negative_control`` may be left out. Files are named relative to ``folder``; pages show the
-    ``name``. InputError for a missing, unknown or wrong key names the key, the given value and the wanted one.
+    A ``table`` with a ``domain`` is the case of a scalar field, any other of a muscle. Instead of text with a unit, numbers in mm,
+    N, MPa, s, rad and tonne are accepted too. Effects may be made by :func:`fem_reference.make_effect`. ``candidate``, ``expect``
+    and ``negative_control`` may be left out. Files are named relative to ``folder``; pages show the ``name``. InputError for a
+    missing, unknown or wrong key names the key, the given value and the wanted one.
     """
     if not isinstance(table, Mapping) or not all(isinstance(key, str) for key in table):
         raise InputError("case", said(table), "keys and tables, as a case.toml has them")
@@ -42,7 +42,7 @@ def _effect(entry: Any) -> Any:
 
 
 def _with_units(annotation: Any, value: Any, unit: str = "") -> Any:
-    """``value`` with every number as text with its unit, where a field of the records in ``annotation`` has a unit."""
+    """``value`` with every number as text with its unit, if the field of the records in ``annotation`` has a unit."""
     if isinstance(value, Mapping):
         records = [kind for kind in kinds(annotation) if isinstance(kind, type) and issubclass(kind, Record)]
         fields = {name: field for record in records for name, field in record.model_fields.items()}

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 from fem_reference.effects import Effect
 from fem_reference.foundations.limits import Range
 from fem_reference.foundations.motion import RigidMotion
-from fem_reference.foundations.records import Name, Record, directed, increasing, one_of
+from fem_reference.foundations.records import Name, Record, directed, increasing, key_rule, one_of, rule
 from fem_reference.foundations.units import Angle, AreaStiffness, Length, LengthUnit, Point, PositiveLength, Time
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS
 from fem_reference.scenes.case import Case
@@ -81,19 +81,12 @@ class CaseBox(Record):
     size: Point
     rounding: Length = 0.0
 
-    @field_validator("size")
-    @classmethod
-    def _check_size(cls, size: Vector) -> Vector:
-        if not min(size) > 0:
-            raise ValueError("three lengths above zero")
-        return size
-
-    @field_validator("rounding")
-    @classmethod
-    def _check_rounding(cls, rounding: float, info: ValidationInfo) -> float:
-        if "size" in info.data and not 0 <= rounding <= min(info.data["size"]) / 2:
-            raise ValueError("a length from 0 to half of the shortest edge")
-        return rounding
+    _check_size = key_rule("size", lambda size, _: min(size) > 0, "three lengths above zero")
+    _check_rounding = key_rule(
+        "rounding",
+        lambda rounding, keys: "size" not in keys or 0 <= rounding <= min(keys["size"]) / 2,
+        "a length from 0 to half of the shortest edge",
+    )
 
 
 class CaseSphere(Record):
@@ -110,18 +103,17 @@ class Rod(Record):
     end: Point
     radius: PositiveLength
 
-    @field_validator("end")
-    @classmethod
-    def _check_end(cls, end: Vector, info: ValidationInfo) -> Vector:
-        if "start" in info.data and not math.dist(info.data["start"], end) > 1e-9:
-            raise ValueError("a point other than the start")
-        return end
+    _check_end = key_rule(
+        "end",
+        lambda end, keys: "start" not in keys or math.dist(keys["start"], end) > 1e-9,
+        "a point other than the start",
+    )
 
 
 class CaseBone(Record):
     """A rigid body: a ``surface`` in a file with coordinates in ``unit``, or exactly one of the closed forms; it rests without
-    ``motion``. ``distance_error``: the error allowed in the distance to a surface, root mean square near it, before rounding.
-    ``distance_rounding``: the standard deviation of a Gaussian mean of that distance, as nothing slides smoothly on flat triangles.
+    ``motion``. ``distance_error``: the allowed error of the distance to a surface, root mean square near it, before rounding.
+    ``distance_rounding``: the standard deviation of a Gaussian mean of this distance, as flat triangles prevent smooth sliding.
     """
 
     name: Name
@@ -160,8 +152,9 @@ class CaseJoint(Record):
 
 
 class Muscle(Record):
-    """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often these are cut into eight.
-    ``mesher``: ``"quality"`` for good tetrahedra, or ``"block"`` for a box along the axes: a grid of boxes, each cut into six.
+    """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often the tetrahedra are cut
+    into eight. ``mesher``: ``"quality"`` for good tetrahedra, or ``"block"`` for a box along the axes: a grid of boxes, each cut
+    into six.
     """
 
     surface: str
@@ -205,8 +198,9 @@ class Landmarks(Record):
 
 class Attachment(Record):
     """The part of the muscle surface that is attached to a bone, given by exactly one of ``vertices``, ``within`` (a distance from
-    the bone) and ``outline``. Springs of a ``stiffness`` over its area hold it; without a stiffness it moves exactly with the bone.
-    Fibres that end beside it continue as a straight ``tendon`` to a point of the bone, which pulls only with the effect ``tendon``.
+    the bone) and ``outline``. Springs of a ``stiffness`` attach its area; without a stiffness it moves exactly with the bone.
+    Fibres that end beside it continue as a straight ``tendon`` to a point of the bone; the tendon pulls only with the effect
+    ``tendon``.
     """
 
     name: Name
@@ -230,15 +224,12 @@ class Frames(Record):
     every: int = Field(gt=0)
     interval: Time | None = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.last <= self.first or (self.last - self.first) % self.every:
-            raise ValueError("last = first + a multiple of every")
-        if (self.last - self.first) // self.every >= MOST_FRAMES:
-            raise ValueError(f"at most {MOST_FRAMES} frames")
-        if self.last > LAST_FRAME:
-            raise ValueError(f"frame numbers up to {LAST_FRAME}")
-        return self
+    _check_last = rule(
+        lambda one: one.last > one.first and (one.last - one.first) % one.every == 0,
+        "last = first + a multiple of every",
+    )
+    _check_count = rule(lambda one: (one.last - one.first) // one.every < MOST_FRAMES, f"at most {MOST_FRAMES} frames")
+    _check_numbers = rule(lambda one: one.last <= LAST_FRAME, f"frame numbers up to {LAST_FRAME}")
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -247,7 +238,9 @@ class Frames(Record):
 
 
 class Uncertain(Range):
-    """The range of a number of the case by its ``key``, such as ``effect[0].mu``; it replaces the range stated by the effect."""
+    """The range of a number of the case by its ``key``, such as ``effect[0].mu``. The range replaces the range stated by the
+    effect.
+    """
 
     key: str
 

@@ -1,7 +1,7 @@
-"""The case of several muscles, which share bones, frames and a reference, as frozen records; and each of them as a case."""
+"""The case of several muscles, which share bones, frames and a reference, as frozen records; and each muscle as a case."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Self
 
@@ -23,8 +23,8 @@ _SHARED = ("proves", "choice", "bone", "joint", "frames", "reference", "candidat
 
 
 class MuscleOfSeveral(Muscle):
-    """One of several muscles: its ``name``, which is also part of the names of its forces, and its own tables. ``effect``: the
-    effects that act in it alone; ``expect``: its expectations.
+    """One of several muscles: its ``name``, also part of the names of its forces, and its tables. ``effect``: the effects that act
+    in this muscle only; ``expect``: its expectations.
     """
 
     name: Name
@@ -36,7 +36,7 @@ class MuscleOfSeveral(Muscle):
 
 
 class MusclesCase(DrivenCase):
-    """The case of several muscles; ``effect`` acts on all."""
+    """The case of several muscles; ``effect`` acts on all muscles."""
 
     muscle: tuple[MuscleOfSeveral, ...] = Field(min_length=2)
 
@@ -44,12 +44,12 @@ class MusclesCase(DrivenCase):
 
     @property
     def touching(self) -> MuscleContact | None:
-        """The contact between the muscles, None where there is none."""
+        """The contact between the muscles, None if there is none."""
         return among(self.effect)
 
     @property
     def apart(self) -> bool:
-        """True where muscles must not cross: contact acts between them, or was left out because they do not come near."""
+        """True if muscles must not cross: contact acts between them, or was left out because they do not come near."""
         return any(isinstance(one, MuscleContact) for one in (*self.effect, *(some.effect for some in self.decisions)))
 
     @property
@@ -73,8 +73,8 @@ class MusclesCase(DrivenCase):
         }
 
     def determining(self) -> dict[str, Any]:
-        """The keys that determine its solution, without expectations; also ``apart``, where the second check tests whether muscles
-        cross although no effect shows it.
+        """The keys that determine the solution, without expectations; also ``apart``, if the second check tests whether muscles
+        cross although no effect shows this.
         """
         tables = super().determining()
         checked = {"apart": True} if self.apart and self.touching is None else {}
@@ -83,7 +83,7 @@ class MusclesCase(DrivenCase):
 
     @property
     def decides(self) -> list[Any]:
-        """The causes of verdicts, as for one muscle. Expectations of single muscles are not among them."""
+        """The causes of verdicts, as for one muscle, without the expectations of single muscles."""
         judged = self.model_copy(update={"expect": tuple(one for muscle in self.muscle for one in muscle.expect)})
         return [self.determining(), *super(MusclesCase, judged).decides[1:]]
 
@@ -105,7 +105,9 @@ class MusclesCase(DrivenCase):
             raise InputError(join(self.place, key), error.got, error.want) from error
 
     def _key(self, i: int, key: str) -> str:
-        """The key in the scene for a ``key`` in the case of muscle number ``i``, where effects on all muscles precede its own."""
+        """The key in the scene for a ``key`` in the case of muscle number ``i``, where effects on all muscles precede the effects
+        on this one.
+        """
         own, name = f"muscle[{i}].", key.partition(".")[0].partition("[")[0]
         shared = [k for k, one in enumerate(self.effect) if not isinstance(one, MuscleContact)]
         if match := re.match(r"effect\[(\d+)\]", key):
@@ -119,7 +121,7 @@ class MusclesCase(DrivenCase):
 
     @property
     def parts(self) -> tuple[MuscleCase, ...]:
-        """Each muscle as a case of its own, without the others; these cases were checked when this case was read."""
+        """Each muscle as a separate case, without the others; these cases were checked when this case was read."""
         everywhere, found = tuple(one for one in self.effect if not isinstance(one, MuscleContact)), list[MuscleCase]()
         for i, muscle in enumerate(self.muscle):
             made: dict[str, Any] = {name: getattr(self, name) for name in _SHARED}
@@ -131,8 +133,30 @@ class MusclesCase(DrivenCase):
         return tuple(found)
 
 
+def muscles_of(case: DrivenCase) -> tuple[Muscle, ...]:
+    """The muscle of a case, or each of several."""
+    return case.muscle if isinstance(case.muscle, tuple) else (case.muscle,)
+
+
+def with_muscles[C: DrivenCase](case: C, change: Callable[[Muscle], Mapping[str, object]]) -> C:
+    """The case with the keys that ``change`` returns for its muscle, or for each of several."""
+    changed = [one.model_copy(update=change(one)) for one in muscles_of(case)]
+    return case.model_copy(update={"muscle": tuple(changed) if isinstance(case.muscle, tuple) else changed[0]})
+
+
+def exactly_attached[C: DrivenCase](case: C) -> C:
+    """The case with exact attachments in place of springs."""
+
+    def exact(one: DrivenCase | Muscle) -> dict[str, object]:
+        if not isinstance(one, MuscleCase | MuscleOfSeveral):
+            return {}
+        return {"attachment": tuple(entry.model_copy(update={"stiffness": None}) for entry in one.attachment)}
+
+    return with_muscles(case, exact).model_copy(update=exact(case))
+
+
 def alone(table: dict[str, Any], place: str) -> dict[str, Any]:
-    """The ``table`` of a scene whose list has one muscle, rewritten as that of a single muscle; unchanged where it has several."""
+    """The ``table`` of a scene whose list has one muscle, rewritten as that of a single muscle; unchanged if it has several."""
     listed = table.get("muscle")
     if not isinstance(listed, list) or len(listed) != 1 or not isinstance(listed[0], dict):
         return table

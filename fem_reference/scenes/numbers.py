@@ -23,7 +23,7 @@ def parts(key: str) -> list[str | int]:
 
 
 def canonical(key: str) -> str:
-    """The one way to write a ``key``.
+    """The canonical text of a ``key``.
 
     >>> canonical("effect.0.mu"), canonical("effect[00].ramp[1].amount")
     ('effect[0].mu', 'effect[0].ramp[1].amount')
@@ -32,7 +32,7 @@ def canonical(key: str) -> str:
 
 
 def number(case: Case, key: str) -> float:
-    """The number of a ``case`` at a ``key``, in its internal unit; InputError where there is none."""
+    """The number of a ``case`` at a ``key``, in its internal unit; InputError if there is none."""
     found = _along(case, key)[-1]
     if isinstance(found, bool) or not isinstance(found, float | int):
         got = "no value" if found is None else f"{type(found).__name__}"
@@ -41,12 +41,12 @@ def number(case: Case, key: str) -> float:
 
 
 def unit(case: Case, key: str) -> str:
-    """The internal unit of the number at a ``key``; empty where it has none."""
+    """The internal unit of the number at a ``key``; empty if it has none."""
     return field_unit(_field(case, key))
 
 
 def read(case: Case, key: str, value: str | float) -> float:
-    """A ``value`` for the number at a ``key``, as in scene files or in its internal unit; InputError where it is not valid."""
+    """A ``value`` for the number at a ``key``, as in scene files or in its internal unit; InputError if it is not valid."""
     field = _field(case, key)
     kind: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
     try:
@@ -114,7 +114,7 @@ def _field(case: Case, key: str) -> Any:
 
 
 def _along(case: Case, key: str) -> list[Any]:
-    """The ``case`` and the values along the parts of a ``key``, each inside the one before; InputError where one does not exist."""
+    """The ``case`` and the values along the parts of a ``key``, each inside the previous one; InputError if one does not exist."""
     found: list[Any] = [case]
     for part in parts(key):
         inside = found[-1]

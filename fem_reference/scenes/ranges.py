@@ -1,4 +1,4 @@
-"""The unknown parameters of a case: the ranges that its effects state, and those that the case states itself."""
+"""The unknown parameters of a case: the ranges stated by its effects, and the ranges stated by the case."""
 
 import re
 
@@ -8,7 +8,7 @@ from fem_reference.foundations.records import join
 from fem_reference.scenes import numbers
 from fem_reference.scenes.muscle import MuscleCase
 
-# Keys of numbers, besides those of effects, whose change leaves the measured lines, bones and frames as they are.
+# Keys of numbers, besides effects, whose change does not affect the measured lines, bones and frames.
 _OTHERS = re.compile(r"attachment\[\d+\]\.(stiffness|outline\.shift\.by)|fibres\.turned\.angle")
 _VARIED = (
     "a number of an effect, the stiffness or outline.shift.by of an attachment, or fibres.turned.angle: "
@@ -39,7 +39,7 @@ def left_out(case: MuscleCase) -> list[str]:
 
 
 def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, float]:
-    """The ends of a range of the number at a ``key``, in its internal unit; InputError at ``place`` where they are not numbers."""
+    """The ends of a range of the number at a ``key``, in its internal unit; InputError at ``place`` if they are not numbers."""
     found = []
     for name in ("low", "high"):
         try:
@@ -59,7 +59,7 @@ def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, flo
 
 
 def check(case: MuscleCase) -> None:
-    """Raise InputError where a ``case`` states a range with invalid ends, or for a key that is not one of its numbers."""
+    """Raise InputError if a ``case`` states a range with invalid ends, or for a key that is not one of its numbers."""
     keys = list[str]()
     for i, entry in enumerate(case.uncertain):
         place = join(case.place, f"uncertain[{i}]")

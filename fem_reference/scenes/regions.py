@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from typing import Annotated
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field
 
 from fem_reference.effects import Effect, region_of
 from fem_reference.foundations.material_point import REST
-from fem_reference.foundations.records import Name, Record, check_used, one_of
+from fem_reference.foundations.records import Name, Record, check_used, key_rule, one_of
 from fem_reference.foundations.units import Length, LengthUnit, PositiveLength
 
 
@@ -34,7 +34,7 @@ class ClosedSurface(Record):
 
 
 class LabelledTets(Record):
-    """The part inside those tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of its cells."""
+    """The part inside the tetrahedra of a VTU or MSH file with one of ``labels`` in an ``array`` of the cells."""
 
     file: str
     unit: LengthUnit
@@ -50,12 +50,7 @@ class ShareOfField(Record):
     first: float = Field(ge=0, lt=1)
     last: float = Field(gt=0, le=1)
 
-    @field_validator("last")
-    @classmethod
-    def _check_last(cls, last: float, info: ValidationInfo) -> float:
-        if not last > info.data.get("first", 0):
-            raise ValueError("more than the first")
-        return last
+    _check_last = key_rule("last", lambda last, keys: last > keys.get("first", 0), "more than the first")
 
 
 class CaseRegion(Record):
@@ -74,17 +69,16 @@ class CaseRegion(Record):
 
     _check = one_of("attachment", "patch", "surface", "tets", "field")
 
-    @field_validator("name")
-    @classmethod
-    def _check_name(cls, name: str) -> str:
-        if name.startswith(REST):
-            raise ValueError(f'a name that does not begin with "{REST}", which stands for the rest of the muscle')
-        return name
+    _check_name = key_rule(
+        "name",
+        lambda name, _: not name.startswith(REST),
+        f'a name that does not begin with "{REST}", which stands for the rest of the muscle',
+    )
 
 
 def check(regions: Sequence[CaseRegion], effects: Sequence[Effect], attachments: Sequence[str], place: str) -> None:
-    """Raise InputError that names a key below ``place`` where one of the ``effects`` acts in a region that does not exist, or one
-    of the ``regions`` is at another attachment than one of ``attachments``.
+    """Raise InputError that names a key below ``place`` if one of the ``effects`` acts in a region that does not exist, or one of
+    the ``regions`` is at an attachment that is not among ``attachments``.
     """
     laws = [
         (f"effect[{i}].in", region.removeprefix(REST)) for i, law in enumerate(effects) if (region := region_of(law))

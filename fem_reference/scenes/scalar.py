@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from fem_reference.effects import FieldEffect
 from fem_reference.foundations.formula import Formula
-from fem_reference.foundations.records import Record, increasing, one_of
+from fem_reference.foundations.records import Record, increasing, one_of, rule
 from fem_reference.scenes.case import Case, Standard
 
 _Nodes = Annotated[
@@ -23,11 +23,7 @@ class Interval(Record):
     count: int = Field(ge=2, le=1_000_000)
     seed: int | None = Field(default=None, ge=0)
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.end <= self.start:
-            raise ValueError("an end beyond the start")
-        return self
+    _check = rule(lambda one: one.end > one.start, "an end beyond the start")
 
 
 class MeshFiles(Record):
@@ -65,7 +61,7 @@ class Boundary(Record):
     The first form is ``on`` an end of an interval or the ``rim`` of triangles: the ``value`` of the field (Dirichlet) or its
     ``slope`` along the outward normal (Neumann). A formula ``where`` limits it to the facets at whose vertices it is above zero.
     The second form is ``bounds``, a file in the format of listing 4.5: a row of vertices, counted from 1, and a row of their fixed
-    values. The slope is 0 on the rest of the boundary.
+    values. On all other parts of the boundary the slope is 0.
     """
 
     on: Literal["left", "right", "rim"] | None = None
@@ -114,7 +110,7 @@ class ScalarCase(Case):
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """The one frame that a steady field has."""
+        """The only frame of a steady field."""
         return (0,)
 
     def standards(self, of: str) -> frozenset[Standard]:

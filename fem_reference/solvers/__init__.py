@@ -27,7 +27,7 @@ def names(task: Task | None = None) -> list[str]:
 
 
 def offers(name: str) -> tuple[Solver[Any, Any], ...]:
-    """The offers of the solver ``name``, one for each task; TypeError where its file has no valid ``SOLVES``."""
+    """The offers of the solver ``name``, one for each task; TypeError if its file has no valid ``SOLVES``."""
     found = vars(importlib.import_module(f"{__name__}.{name}")).get("SOLVES")
     if not isinstance(found, tuple) or not found or not all(isinstance(offer, Solver) for offer in found):
         want = "a tuple of MuscleSolver, FieldSolver or BodySolver (solvers/common/protocol.py)"
@@ -77,7 +77,7 @@ def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
 
 
 def takes_effects(name: str) -> bool:
-    """True where the solver ``name`` simulates the effects of a scene."""
+    """True if the solver ``name`` simulates the effects of a scene."""
     return any(isinstance(offer, MuscleSolver) and offer.check_effects is not None for offer in offers(name))
 
 

@@ -249,8 +249,5 @@ def _edge_weights(surface: Surface, name: Weights) -> Any:
 _REPORTED = {"weights": "clamped cotangent", "fixed": "remove", "rotations": "each", "volume_step": False}
 _REPORTED |= {"iterations": 4}
 # The second row of the table is scaled by eq. 5.9 after each iteration (section 6.2).
-_TABLE = (
-    TableRow("ARAP", "arap", _REPORTED),
-    TableRow("ARAP", "arap_volume_step", _REPORTED | {"volume_step": True}),
-)
+_TABLE = (TableRow("ARAP", "arap", _REPORTED), TableRow("ARAP", "arap_volume_step", _REPORTED | {"volume_step": True}))
 SOLVES = (MuscleSolver(settings=ArapSettings, solve=solve, example=_REPORTED | {"iterations": 3}, table=_TABLE),)

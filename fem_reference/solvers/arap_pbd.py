@@ -7,13 +7,13 @@ sweeps of PBD's projections (edge lengths, volume, dihedral angles) start from t
 If both are requested, the projections come last. As in ``arap``, there is no contact.
 """
 
-from typing import Annotated, Self
+from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.records import Record
+from fem_reference.foundations.records import Record, rule
 from fem_reference.foundations.units import PositiveLength
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
@@ -54,11 +54,10 @@ class ArapPbdSettings(Record):
     volume_constraint: bool
     projections: Projections | None = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if not self.volume_constraint and self.projections is None:
-            raise ValueError('volume_constraint = true or "projections" (without both it is the solver arap)')
-        return self
+    _check = rule(
+        lambda one: one.volume_constraint or one.projections is not None,
+        'volume_constraint = true or "projections" (without both it is the solver arap)',
+    )
 
 
 def solve(setup: Setup, settings: ArapPbdSettings, sink: Sink) -> Outcome:
@@ -123,7 +122,7 @@ def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdCons
 
 
 def least_root(points: Floats, direction: Floats, rest: PbdConstraints) -> float | None:
-    """The lambda nearest to 0 at which ``points + lambda direction`` (n, 3) have the volume of ``rest``, None where there is none.
+    """The lambda nearest to 0 at which ``points + lambda direction`` (n, 3) have the volume of ``rest``, None if there is none.
 
     Six times the volume is a cubic form: its coefficients are values and slopes at ``points`` and at ``direction``. It is solved
     for ``1 / lambda``, as this stays accurate where the cubic term nearly vanishes.

@@ -160,7 +160,7 @@ def of_function(function: Callable[..., None], given: Mapping[str, Any], folder:
 
 
 def placeholders(command: str, place: str) -> tuple[str, ...]:
-    """The settings in a ``command``; InputError where it cannot be split, lacks a folder, or has braces without a name."""
+    """The settings in a ``command``; InputError if it cannot be split, lacks a folder, or has braces without a name."""
     where = join(place, "command")
     try:
         words = shlex.split(command)
@@ -212,7 +212,7 @@ class CommandSolver(MuscleSolver[CommandSettings]):
 
 
 def require(settings: CommandSettings) -> None:
-    """Raise InputError where there is no such program, or a file that it needs is missing."""
+    """Raise InputError if there is no such program, or a file that it needs is missing."""
     _check_program(settings.command, settings.place, "command")
     sources(settings)
 
@@ -275,7 +275,7 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
 
 
 def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended) -> dict[str, float]:
-    """The time that the program states for solving its frames alone; InputError where that exceeds the time of its run."""
+    """The time that the program states for solving its frames alone; InputError if that exceeds the time of its run."""
     found = {} if said.threads is None else {"threads": float(said.threads)}
     if said.seconds_per_frame is None:
         return found

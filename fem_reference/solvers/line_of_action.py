@@ -5,14 +5,15 @@ points it is as short as possible. It has a length, with ``hill`` also a force, 
 goes around an obstacle on the shorter side: once its ends pass opposite points, it changes sides.
 """
 
-from typing import Annotated, Self
+from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.records import Record, join
+from fem_reference.foundations.records import Record, join, rule
 from fem_reference.geometry.winding import Winding
 from fem_reference.geometry.wrapping import Paths
 from fem_reference.problems.muscle import MuscleProblem
@@ -40,14 +41,11 @@ class LineSettings(Record):
     obstacle: tuple[ObstacleOn, ...] = ()
     hill: HillSettings | None = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.via and self.via_count:
-            raise ValueError('at most one of "via", "via_count"')
-        places = [via.at for via in self.via]
-        if places != sorted(set(places)):
-            raise ValueError("via-points in the order in which a fibre passes them")
-        return self
+    _check_one = rule(lambda one: not (one.via and one.via_count), 'at most one of "via", "via_count"')
+    _check_order = rule(
+        lambda one: all(early.at < late.at for early, late in pairwise(one.via)),
+        "via-points in the order in which a fibre passes them",
+    )
 
 
 class Shortest:
@@ -93,7 +91,7 @@ class Shortest:
         return sums | _on_bones(self.problem.bones, self.wraps, passed, paths, found[:, 0])
 
     def trouble(self) -> Trouble | None:
-        """The trouble with a fixed point inside an obstacle or a path that was not found; None where there is none."""
+        """The trouble with a fixed point inside an obstacle or a path that was not found; None if there is none."""
         return self.wrong
 
     def frame(self, _: int) -> Frame:

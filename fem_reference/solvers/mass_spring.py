@@ -159,7 +159,7 @@ class MassSpringModel:
         return points
 
     def trouble(self) -> Trouble | None:
-        """The trouble with the boundary of the tetrahedra; None where there is none."""
+        """The trouble with the boundary of the tetrahedra; None if there is none."""
         return self.check.trouble(self.points)
 
     def frame(self, number: int) -> Frame:

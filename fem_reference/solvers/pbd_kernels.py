@@ -69,7 +69,7 @@ def move(points: Floats, i: int, factor: float, direction: Vector) -> None:
 def distance(p1: Vector, p2: Vector) -> tuple[float, Vector]:
     """Distance of two points [mm] and its gradient at ``p1``, minus that at ``p2``. Eq. 5.15-5.17.
 
-    The gradient is zero where the points coincide.
+    The gradient is zero if the points coincide.
     """
     apart = minus(p1, p2)
     length = math.sqrt(dot(apart, apart))
@@ -101,7 +101,7 @@ def volume(points: Floats, triangles: Ints) -> tuple[float, Floats]:
 def dihedral(p1: Vector, p2: Vector, p3: Vector, p4: Vector) -> tuple[float, Vector, Vector, Vector, Vector]:
     """Angle [rad] of triangles (p1, p2, p3) and (p1, p2, p4) about their edge p1-p2, and its gradients. Eq. 5.22-5.30.
 
-    It is pi if they are flat and cannot distinguish the two sides of a fold. Gradients are zero where arccos has none: flat,
+    It is pi if they are flat and cannot distinguish the two sides of a fold. Gradients are zero if arccos has none: flat,
     folded shut, no area. There arccos d loses half its digits too: it is taken as atan2(sine, d). Eq. 5.26 needs
     eq. 5.30 transposed, and ``n2 . (n2 x p2)`` in it is an outer product.
     """
@@ -213,7 +213,7 @@ def project_dihedrals(points: Floats, inverse_masses: Floats, hinges: Ints, rest
 
 @compiled
 def multiplier_step(value: float, weight: float, softness: float, multiplier: float) -> float:
-    """``dl`` of a constraint of this ``value``; 0 where nothing could move."""
+    """``dl`` of a constraint of this ``value``; 0 if nothing could move."""
     if weight > 0:
         return -(value + softness * multiplier) / (weight + softness)
     return 0.0

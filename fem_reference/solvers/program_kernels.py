@@ -80,7 +80,7 @@ def project_volume(points: Floats, triangles: Ints, rest: float) -> None:
 
 @compiled
 def normals_of(points: Floats, triangles: Ints) -> Floats:
-    """The unit normal of each of ``triangles`` (m, 3); zero where there is none."""
+    """The unit normal of each of ``triangles`` (m, 3); zero if there is none."""
     found = np.empty((len(triangles), 3))
     for t in range(len(triangles)):
         a, b, c = at(points, triangles[t, 0]), at(points, triangles[t, 1]), at(points, triangles[t, 2])
@@ -157,7 +157,7 @@ def project_folds(points: Floats, hinges: Ints, rest: Floats, factor: float) -> 
 
 @compiled
 def _unit_normal(a: Vector, b: Vector) -> Vector:
-    """The unit vector along a x b; zero where there is none."""
+    """The unit vector along a x b; zero if there is none."""
     normal = cross(a, b)
     size = math.sqrt(dot(normal, normal))
     return times(1 / size, normal) if size > 1e-10 else (0.0, 0.0, 0.0)
@@ -165,7 +165,7 @@ def _unit_normal(a: Vector, b: Vector) -> Vector:
 
 @compiled
 def _is_inside(inside: Bools, place: Vector) -> bool:
-    """True where a ``place``, in voxels, lies in one that is inside."""
+    """True if a ``place``, in voxels, lies in one that is inside."""
     x, y, z = place
     count = len(inside)
     return 0 <= x < count and 0 <= y < count and 0 <= z < count and inside[int(x), int(y), int(z)]
@@ -173,7 +173,7 @@ def _is_inside(inside: Bools, place: Vector) -> bool:
 
 @compiled
 def _marks(a: Vector, b: Vector, c: Vector, normal: Vector, corner: Vector) -> bool:
-    """True where the triangle a, b, c, in voxels, marks the voxel whose lower corner is ``corner``.
+    """True if the triangle a, b, c, in voxels, marks the voxel whose lower corner is ``corner``.
 
     It marks the voxel if its plane is near and the corner is beyond none of its edges by more than a diagonal. The planes at the
     edges are made with its ``normal`` in mm, although voxels are not cubes.

@@ -73,7 +73,7 @@ class About(Record):
 
     @property
     def lacks(self) -> str:
-        """The end of a sentence with what was left out; empty where nothing was."""
+        """The end of a sentence with what was left out; empty if nothing was."""
         return f"; left out: {', '.join(self.left_out)}" if self.left_out else ""
 
     @field_validator("unit")
@@ -152,7 +152,7 @@ def checked_frames(setup: Setup, folder: Path, unit: float) -> Iterator[Frame]:
 
 
 def checked_about(folder: Path, unit: float | None) -> About:
-    """The ``candidate.toml`` of the sequence; InputError where its unit differs from ``unit`` [mm], or a file from its hash."""
+    """The ``candidate.toml`` of the sequence; InputError if its unit differs from ``unit`` [mm], or a file from its hash."""
     said = about(folder)
     if said.unit is not None and unit is not None and length_unit(said.unit) != unit:
         place = f"{_about_file(folder)}: unit"
@@ -205,7 +205,7 @@ def _sequence(source: Path, unit: float, interval: float | None) -> dict[int, Pa
 
 
 def _number(time: float, interval: float | None) -> int | None:
-    """The frame number at ``time``; None where it lies between two frames."""
+    """The frame number at ``time``; None if it lies between two frames."""
     number = time if interval is None else time / interval
     return round(number) if math.isfinite(number) and abs(number - round(number)) < ON_FRAME else None
 
@@ -263,7 +263,7 @@ def _welded(soup: Surface, rest: Surface) -> Floats:
 
 
 def _check_at_rest(place: str, number: int, positions: Floats, rest: Surface) -> None:
-    """Raise InputError where the first frame is far from ``rest``; warn where it is slightly off."""
+    """Raise InputError if the first frame is far from ``rest``; warn where it is slightly off."""
     away = float(np.sqrt(np.mean(np.sum((positions - rest.points) ** 2, axis=1))))
     limit = NEAR_REST * diagonal(rest.points)
     got = f"a first frame ({number}) that is {away:.3g} mm (rms) from the rest surface {rest.place}"

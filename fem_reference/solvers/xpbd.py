@@ -123,7 +123,7 @@ class XpbdStep:
 
 
 def inverse_masses(surface: Surface, attached: Ints, density: float) -> Floats:
-    """Inverse masses (n,) [1/t] of vertices that share the mass of the body as they share its surface; 0 where attached."""
+    """Inverse masses (n,) [1/t] of vertices that share the mass of the body as they share its surface; 0 if attached."""
     areas = vertex_areas(surface.points, surface.triangles)
     mass = density * enclosed_volume(surface.points, surface.triangles) * areas / areas.sum()
     found = 1 / mass

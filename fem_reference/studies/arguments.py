@@ -11,6 +11,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import path, said
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
+from fem_reference.scenes.muscles import MusclesCase
 
 
 def check[T](given: object, kind: type[T], place: str, want: str) -> T:
@@ -32,6 +33,15 @@ def is_of_body(reference: object, of: object) -> bool:
     if reference.body is not of:
         raise InputError("reference", "a solution of another body", "what solve_body returned for this one")
     return True
+
+
+def check_muscle(name: object, case: Case) -> None:
+    """Raise InputError unless ``name`` is that of one of several muscles of the ``case``, or empty for the case of one."""
+    names = [one.name for one in case.muscle] if isinstance(case, MusclesCase) else [""]
+    if name not in names:
+        raise InputError(
+            "muscle", said(name), f"one of {', '.join(names)}" if case.parts else "none, as there is but one"
+        )
 
 
 def check_keys(keys: object) -> Sequence[str]:

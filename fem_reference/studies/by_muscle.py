@@ -1,7 +1,7 @@
 """Several muscles solved together by one reference: a comparison for each, with candidates that solve it alone."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +9,10 @@ import numpy as np
 from fem_reference.assessment import neighbours
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.errors import InputError
-from fem_reference.problems.muscles import MusclesProblem
-from fem_reference.runs.store import Run, complete
-from fem_reference.runs.views import beside, run_of
+from fem_reference.runs.store import complete
+from fem_reference.runs.views import beside
 from fem_reference.scenes.case import Candidate, Case
-from fem_reference.studies import judging
+from fem_reference.studies import judging, muscle_bars
 from fem_reference.studies.execution import Bench
 
 # A remark that pages of several muscles make on candidates.
@@ -37,17 +36,10 @@ class ByMuscle:
         return [dict(zip(names, row, strict=True)) for row in self.worst]
 
 
-def views(bench: Bench[Case], run: Run) -> dict[str, Run]:
-    """The ``run`` of several muscles split into one for each, by name."""
-    problem, parts = bench.problem(), bench.parts
-    assert isinstance(problem, MusclesProblem)
-    found = {name: run_of(run, problem, name) for name in parts}
-    return {name: replace(one, origin=one.origin | {"scene": parts[name].scene.key}) for name, one in found.items()}
-
-
-def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]]) -> ByMuscle:
+def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, error_bars: bool = False) -> ByMuscle:
     """A comparison for each muscle of a case with several: its part of the common reference, and candidates that solve it alone.
-    Recorded frames are read from folders named after the muscles; a candidate may lack some.
+    Recorded frames are read from folders named after the muscles; a candidate may lack some. With ``error_bars``, these are
+    made; else stored ones are used.
     """
     parts, found = bench.parts, dict[str, Comparison]()
     chosen = [(bench.found(*one), one[1]) for one in chosen]
@@ -57,7 +49,8 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]]) -> ByM
             want = f"folders {' or '.join(parts)} in it, with the frames of these muscles"
             raise InputError(place, f'"{entry.settings["folder"]}" without frames of a muscle', want)
     reference, numbers = bench.reference(), bench.scene.numbers
-    runs = {"reference": {name: complete(run, numbers) for name, run in views(bench, reference).items()}}
+    bars = (muscle_bars.obtain if error_bars else muscle_bars.stored)(bench, reference)
+    runs = {"reference": {name: complete(run, numbers) for name, run in bench.by_muscle(reference).items()}}
     for name, part in parts.items():
         for entry, place in filter(None, own[name]):
             run = part.obtain(entry.name, entry, place)
@@ -65,7 +58,7 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]]) -> ByM
     runs = {who: beside(some) for who, some in runs.items()}
     for name, part in parts.items():
         solved = [some[name] for some in runs.values() if name in some]
-        found[name] = judging.compare(part, solved[0], solved[1:])
+        found[name] = judging.compare(part, solved[0], solved[1:], bars.get(name))
     lacking = tuple((entry.name, name) for i, (entry, _) in enumerate(chosen) for name in parts if own[name][i] is None)
     worst = list[tuple[str, str, str, float, int]]()
     for who, some in runs.items():

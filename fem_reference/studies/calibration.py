@@ -30,12 +30,7 @@ _WANT = "METRIC.STATISTIC, force.BONE, force.BONE.x, or position.VERTEX.x"
 
 
 def calibrate_case(
-    case: Case,
-    data: str | Path,
-    fit: Sequence[str],
-    *,
-    store: str | Path = STORE,
-    progress: Progress | None = None,
+    case: Case, data: str | Path, fit: Sequence[str], *, store: str | Path = STORE, progress: Progress | None = None
 ) -> Calibration:
     """Fit numbers of the case of a muscle to measurements, by runs of its reference at the size that the case has.
 

@@ -23,6 +23,7 @@ from fem_reference.problems.stresses import Watch
 from fem_reference.runs import store
 from fem_reference.runs.key import code_hash, key, machine, versions
 from fem_reference.runs.store import Frame, Outcome, Run, Sink, collected
+from fem_reference.runs.views import run_of
 from fem_reference.runs.writer import Writer, pass_on
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import MACHINE_ONLY, Candidate, Case, SolverChoice
@@ -107,6 +108,13 @@ class Bench[C: Case]:
         for name, bench in made.items():
             bench._setup = partial(lambda name: cast("MusclesSetup", self._setup()).muscles[name], name)
         return made
+
+    def by_muscle(self, run: Run) -> dict[str, Run]:
+        """The ``run`` of several muscles split into one for each, by name."""
+        problem, parts = self.problem(), self.parts
+        assert isinstance(problem, MusclesProblem)
+        found = {name: run_of(run, problem, name) for name in parts}
+        return {name: replace(one, origin=one.origin | {"scene": parts[name].scene.key}) for name, one in found.items()}
 
     def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
         """InputError where settings of the reference, of a candidate of the case (except recorded frames, which may come later) or

@@ -80,12 +80,13 @@ def locked(folder: Path) -> Iterator[None]:
 @contextmanager
 def bars_kept(folder: Path) -> Iterator[None]:
     """A context that keeps the error bars beside a run if the same packages solve it again for its states."""
-    path, before = folder / error_bars.FILE, store.finished(folder)
+    before = store.finished(folder)
     same = before is not None and before.origin.get("versions") == versions()
-    bars = path.read_text(encoding="utf-8") if same and path.is_file() else None
+    bars = {path: path.read_text(encoding="utf-8") for path in folder.rglob(error_bars.FILE)} if same else {}
     yield
-    if bars is not None:
-        files.write_text(path, bars)
+    for path, text in bars.items():
+        files.make_folder(path.parent)
+        files.write_text(path, text)
 
 
 def seen(watch: Watch, folder: Path, numbers: Sequence[float]) -> Iterator[tuple[Decision, ...]]:

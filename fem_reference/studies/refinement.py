@@ -19,19 +19,28 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Ints
 from fem_reference.foundations.records import Record
 from fem_reference.geometry.sectors import attached_area, attached_shares
+from fem_reference.io import files
 from fem_reference.metrics import context_of
 from fem_reference.problems.body import Body
 from fem_reference.problems.finer import finer as on_finer_cells
 from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.case import Case
-from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.muscle import DrivenCase, MuscleCase
+from fem_reference.scenes.muscles import exactly_attached
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.variations import on_tetrahedra, with_contact, with_distances, without_states
+from fem_reference.studies.variations import (
+    by_springs,
+    on_larger,
+    on_tetrahedra,
+    with_contact,
+    with_distances,
+    without_states,
+)
 
 log = logging.getLogger(__name__)
 
-_EXACT = "exact attachments"
+EXACT = "exact attachments"
 # Files, besides the metrics, whose code makes error bars.
 _MAKING = (differences.__file__, error_bars.__file__, force_bars.__file__, __file__)
 
@@ -44,17 +53,20 @@ CHEAP = 0.2
 # A quadratic element has as many unknowns on the same cells as a linear one on cells of half the size, and does not lock.
 _QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
 
-Vary = Callable[[MuscleCase], MuscleCase]
+type Vary[C] = Callable[[C], C]
 
 
-def variations(case: MuscleCase, settings: Record, *, pressed: bool = True, touched: bool = True) -> dict[str, Vary]:
+def variations[C: DrivenCase](
+    case: C, settings: Record, *, pressed: bool = True, touched: bool = True
+) -> dict[str, Vary[C]]:
     """Changes, by name, each of which halves a cause of numerical error other than tetrahedra: compliance and smoothing of contact
-    with bones, if one ``pressed``, and of self-contact, if the muscle ``touched`` itself; error and rounding of distances to
-    bones; load steps, if the ``settings`` have them and a state depends on them: with drag, viscosity or friction.
+    with bones, if one ``pressed``, and of muscles with themselves or each other, if any ``touched``; error and rounding of
+    distances to bones; load steps, if the ``settings`` have them and a state depends on them: with drag, viscosity or friction.
     """
-    found, bones = dict[str, Vary](), among(case.effects) if pressed else None
-    itself = touching.among(case.effects) if touched else None
-    laws = [(name, law) for name, law in (("contact", bones), ("contact with itself", itself)) if law is not None]
+    found, bones = dict[str, Vary[C]](), among(case.effects) if pressed else None
+    of_muscles = touching.among(case.effects) if touched else None
+    named = (("contact", bones), ("contact between muscles" if case.parts else "contact with itself", of_muscles))
+    laws = [(name, law) for name, law in named if law is not None]
     for name, law in laws:
         found[f"{name} stiffness"] = partial(with_contact, kind=type(law), stiffness=2 * law.stiffness)
         found[f"{name} smoothing"] = partial(with_contact, kind=type(law), smoothing=law.smoothing / 2)
@@ -67,7 +79,7 @@ def variations(case: MuscleCase, settings: Record, *, pressed: bool = True, touc
     return found
 
 
-def half_steps(case: MuscleCase, settings: Record) -> Vary:
+def half_steps[C: DrivenCase](case: C, settings: Record) -> Vary[C]:
     """A change to load steps of at most half the length; each step ends at a frame, so ``frames.every`` bounds its length too."""
     own = settings.model_dump()
     largest = min(case.frames.every, own["largest_step"] or math.inf) / 2
@@ -82,14 +94,21 @@ def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBa
     if reference.outcome.status != "converged" or reference.fibres is None or not reference.has_surface:
         log.info("error bar: none, of a reference that did not converge or has no interior")
         return None
+    own = bench.of_muscle()
     with fenicsx.shared():
-        pair = _pair(bench.of_muscle(), reference, model)
+        pair = _pair(own, reference, model)
+    return made(pair, own, reference.folder, reference)
+
+
+def made(pair: Pair, bench: Bench[MuscleCase], folder: Path | None, reference: Run) -> ErrorBars:
+    """The error bars of a ``pair`` of runs of the muscle of a bench; stored in a ``folder``, if given, as of ``reference``."""
     log.info("error bar: measuring the runs against each other")
-    context = context_of(bench.of_muscle().setup(), reference)
+    context = context_of(bench.setup(), pair.fine)
     bars = error_bars.error_bars(pair, context)
     bars = replace(bars, bars=(*bars.bars, *force_bars.force_bars(pair, context)))
-    if reference.folder is not None:
-        error_bars.save(bars, reference.folder, _of(reference))
+    if folder is not None:
+        files.make_folder(folder)
+        error_bars.save(bars, folder, _of(reference))
     return bars
 
 
@@ -114,17 +133,20 @@ def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | N
     return obtain(bench, reference, model=False)
 
 
-def stored(reference: Run) -> ErrorBars | None:
-    """The error bars stored beside a reference run; None where there are none, or they are of another run or of other metrics."""
+def stored(reference: Run, muscle: str = "") -> ErrorBars | None:
+    """The error bars stored beside a reference run, those of one ``muscle`` of several in its folder; None where there are none, or
+    they are of another run or of other metrics.
+    """
     if reference.folder is None:
         return None
-    bars = error_bars.load(reference.folder, _of(reference))
-    if bars is None and (reference.folder / error_bars.FILE).exists():
-        log.info("%s: made by other metrics; --error-bar computes it again", reference.folder / error_bars.FILE)
+    folder = reference.folder / muscle
+    bars = error_bars.load(folder, _of(reference))
+    if bars is None and (folder / error_bars.FILE).exists():
+        log.info("%s: made by other metrics; --error-bar computes it again", folder / error_bars.FILE)
     return bars if bars is None or bars.numbers == reference.numbers else None
 
 
-def needed(bench: Bench[MuscleCase], reference: Run) -> dict[str, Vary]:
+def needed[C: DrivenCase](bench: Bench[C], reference: Run) -> dict[str, Vary[C]]:
     """The variations that can change a reference: those of contact only if something was pressed."""
     areas = [reference.scalars.get(f"{name}_area") for name in ("contact", "touching")]
     pressed, touched = (area is None or bool(np.nanmax(area) > 0) for area in areas)
@@ -132,9 +154,9 @@ def needed(bench: Bench[MuscleCase], reference: Run) -> dict[str, Vary]:
     return variations(bench.scene, settings, pressed=pressed, touched=touched)
 
 
-def finer(bench: Bench[MuscleCase], reference: Run, ratio: float) -> MuscleCase:
+def finer[C: DrivenCase](bench: Bench[C], reference: Run, ratio: float) -> C:
     """The scene of a bench on tetrahedra of ``ratio`` times the size, with every other cause of error in its bars halved."""
-    scene = on_tetrahedra(bench.scene, tet_size=ratio * bench.scene.muscle.tet_size)
+    scene = on_larger(bench.scene, ratio)
     for vary in needed(bench, reference).values():
         scene = vary(scene)
     return scene
@@ -142,31 +164,44 @@ def finer(bench: Bench[MuscleCase], reference: Run, ratio: float) -> MuscleCase:
 
 def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
     base, sizes = coarser(bench.scene)
-    larger, varied = f"tetrahedra of {sizes[1]:.3g} mm", needed(bench, reference)
-    scenes = {larger: base} | {name: vary(base) for name, vary in varied.items()}
-    springs = any(entry.stiffness is not None for entry in base.attachment)
-    if model and springs:
-        attached = tuple(entry.model_copy(update={"stiffness": None}) for entry in base.attachment)
-        scenes[_EXACT] = base.model_copy(update={"attachment": attached})
+    larger, springs = f"tetrahedra of {sizes[1]:.3g} mm", by_springs(base)
+    found = solutions(bench, reference, {larger: base}, sizes[1] / sizes[0], model=model and springs)
+    runs = {name: run for name, (_, run) in found.items()}
+    coarse, exact = runs.pop(larger), runs.pop(EXACT, None)
+    check_coarser(bench, tets(reference), tets(coarse))
+    return Pair(reference, coarse, sizes, runs, exact, safety(bench), springs)
+
+
+def solutions[C: DrivenCase](
+    bench: Bench[C], reference: Run, larger: dict[str, C], ratio: float, *, model: bool
+) -> dict[str, tuple[Bench[C], Run]]:
+    """Benches and runs, by name: of the scene on ``larger`` tetrahedra, of ``ratio`` times the size; of this scene with each other
+    cause of error halved; and, with ``model``, of this scene with exact attachments, where it can be solved.
+    """
+    (base,) = larger.values()
+    scenes = larger | {name: vary(base) for name, vary in needed(bench, reference).items()}
+    if model:
+        scenes[EXACT] = exactly_attached(base)
     # The time falls at least in proportion to the number of tetrahedra.
-    seconds = reference.outcome.cost.get("seconds", 0.0) * (sizes[0] / sizes[1]) ** 3
-    runs = {}
+    seconds = reference.outcome.cost.get("seconds", 0.0) / ratio**3
+    found = {}
     for i, (name, changed) in enumerate(scenes.items()):
         left = seconds * (len(scenes) - i)
         log.info("error bar: run %d of %d, %s; about %.0f s for what is left", i + 1, len(scenes), name, left)
         try:
-            runs[name] = _solved(bench, changed, name, reference)
+            found[name] = _solved(bench, changed, name, reference)
         except InputError as error:
-            if name != _EXACT:
+            if name != EXACT:
                 raise
             log.info("error bar: without the change by exact attachments: %s", error)
-    coarse = runs[larger]
-    if not _tets(coarse) < _tets(reference):
-        got = f"meshes of {_tets(reference):.0f} and {_tets(coarse):.0f} tetrahedra"
+    return found
+
+
+def check_coarser(bench: Bench[MuscleCase], fine: float, coarse: float) -> None:
+    """InputError unless a mesh of ``coarse`` tetrahedra has fewer than one of ``fine``."""
+    if not coarse < fine:
+        got = f"meshes of {fine:.0f} and {coarse:.0f} tetrahedra"
         raise InputError(f"{bench.scene.place}: muscle.tet_size", got, "a size for which a coarser mesh differs")
-    return Pair(
-        reference, coarse, sizes, {name: runs[name] for name in varied}, runs.get(_EXACT), safety(bench), springs
-    )
 
 
 def safety(bench: Bench[MuscleCase]) -> float:
@@ -187,20 +222,20 @@ def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
     if refinements:
         larger = on_tetrahedra(case, refinements=refinements - 1)
         return larger, (size / 2**refinements, size / 2 ** (refinements - 1))
-    return on_tetrahedra(case, tet_size=size * RATIO), (size, size * RATIO)
+    return on_larger(case, RATIO), (size, size * RATIO)
 
 
-def _solved(bench: Bench[MuscleCase], case: MuscleCase, name: str, reference: Run) -> Run:
-    """The reference's run of a changed scene, over the frames of ``reference``."""
+def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) -> tuple[Bench[C], Run]:
+    """The bench of a changed scene, and the reference's run of it over the frames of ``reference``."""
+    other = Bench(case, bench.store, bench.ranks)
     try:
-        choice = without_states(case.reference)
-        run = Bench(case, bench.store, bench.ranks).obtain(f"reference, {name}", choice, "reference")
+        run = other.obtain(f"reference, {name}", without_states(case.reference), "reference")
     except InputError as error:
         got = f"a scene that cannot be set up ({error})"
         raise InputError(f"error bar, {name}", got, "a finer reference") from error
     if run.outcome.status != "converged":
         log.info("error bar: %s: %s, %s", name, run.outcome.status, run.outcome.message)
-    return complete(run, reference.numbers)
+    return other, complete(run, reference.numbers)
 
 
 def _of(reference: Run) -> dict[str, str]:
@@ -218,10 +253,10 @@ def _measuring_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-def _tets(run: Run) -> float:
-    """The number of tetrahedra of a run, NaN where it is not stated."""
-    tets = run.origin.get("mesh", {}).get("tets")
-    return tets if isinstance(tets, float | int) else math.nan
+def tets(run: Run, fact: str = "tets") -> float:
+    """The number of tetrahedra of a run by the name of the ``fact``, NaN where it is not stated."""
+    found = run.origin.get("mesh", {}).get(fact)
+    return found if isinstance(found, float | int) else math.nan
 
 
 def body_bars(solved: Run) -> BodyBars | None:

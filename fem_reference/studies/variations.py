@@ -22,7 +22,8 @@ from fem_reference.io import files
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import SolverChoice
-from fem_reference.scenes.muscle import MuscleCase, VertexList
+from fem_reference.scenes.muscle import DrivenCase, MuscleCase, VertexList
+from fem_reference.scenes.muscles import with_muscles
 
 TETRAHEDRA, TRIANGLES = "tetrahedra", "triangles"
 # Sizes of tetrahedra relative to the case's, each with every number of refinements up to the case's own.
@@ -33,18 +34,28 @@ _REFINED = {0: "not refined", 1: "refined once", 2: "refined twice"}
 _STIFFNESSES, _DISTANCES = (0.1, 0.3, 3.0), (10.0, 3.0, 0.3)
 
 
-def on_tetrahedra(case: MuscleCase, **changes: float) -> MuscleCase:
-    """The case with other keys of its muscle: ``tet_size`` [mm], ``refinements``."""
-    return case.model_copy(update={"muscle": case.muscle.model_copy(update=changes)})
+def on_tetrahedra[C: DrivenCase](case: C, **changes: float) -> C:
+    """The case with other keys of its muscle, or of each of several: ``tet_size`` [mm], ``refinements``."""
+    return with_muscles(case, lambda _: changes)
 
 
-def with_contact(case: MuscleCase, kind: type[Effect] = Contact, **changes: float) -> MuscleCase:
-    """The case with other parameters of its contact, of a ``kind``: with bones, or of the muscle with itself."""
-    effects = (one.model_copy(update=changes) if isinstance(one, kind) else one for one in case.effects)
+def on_larger[C: DrivenCase](case: C, ratio: float) -> C:
+    """The case on tetrahedra of ``ratio`` times the size, in each of several muscles."""
+    return with_muscles(case, lambda one: {"tet_size": ratio * one.tet_size})
+
+
+def with_contact[C: DrivenCase](case: C, kind: type[Effect] = Contact, **changes: float) -> C:
+    """The case with other parameters of its contact, of a ``kind``: with bones, or of muscles with themselves or each other."""
+    effects = (one.model_copy(update=changes) if isinstance(one, kind) else one for one in case.effect)
     return case.model_copy(update={"effect": tuple(effects)})
 
 
-def with_distances(case: MuscleCase, factor: float, *keys: str) -> MuscleCase:
+def by_springs(case: MuscleCase) -> bool:
+    """True where an attachment is by springs."""
+    return any(entry.stiffness is not None for entry in case.attachment)
+
+
+def with_distances[C: DrivenCase](case: C, factor: float, *keys: str) -> C:
     """The case with ``keys`` of the distances to the surfaces of bones times ``factor``; closed forms are exact."""
     bones = (
         bone.model_copy(update={key: factor * getattr(bone, key) for key in keys}) if bone.surface else bone

@@ -18,7 +18,7 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.solvers import command, fenicsx, recorded
-from fem_reference.studies import arguments, judging, refinement
+from fem_reference.studies import arguments, judging, muscle_bars, refinement
 from fem_reference.studies.execution import Bench
 
 STORE = Path("reports/runs")
@@ -83,7 +83,7 @@ def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
 
 @overload
 def error_bars(
-    case: Case, reference: Run, *, store: str | Path = STORE, progress: Progress | None = None
+    case: Case, reference: Run, *, muscle: str = "", store: str | Path = STORE, progress: Progress | None = None
 ) -> ErrorBars | None: ...
 
 
@@ -94,22 +94,29 @@ def error_bars(
 
 
 def error_bars(
-    case: Case | Body, reference: Run, *, store: str | Path = STORE, progress: Progress | None = None
+    case: Case | Body,
+    reference: Run,
+    *,
+    muscle: str = "",
+    store: str | Path = STORE,
+    progress: Progress | None = None,
 ) -> ErrorBars | BodyBars | None:
     """Estimate the error of each statistic of a reference, from runs on larger tetrahedra and with finer contact; or that of a body
     on cells of its shape, from a solution on smaller cells or with more unknowns in each.
 
     ``reference``: the result of :func:`solve` without a ``solver``, beside whose run bars are stored, or of :func:`solve_body`.
+    ``muscle``: the name of the one whose bars are wanted, of a case of several muscles; the runs are those of all.
     Each statistic has a bar for each frame, in its unit; a body has bars of points, forces, moments and energy. None where the
     reference did not converge.
     """
     with reported(progress):
         if arguments.is_of_body(reference, case):
             return refinement.body_bars(reference)
-        muscle = casefile.muscle(arguments.check_case(case))
-        arguments.check_run(reference, muscle, "reference")
-        bench = Bench(muscle, arguments.free_folder(store, "store"))
-        return refinement.bars(bench, reference)
+        scene = arguments.check_case(case)
+        arguments.check_muscle(muscle, scene)
+        arguments.check_run(reference, scene, "reference")
+        bench = Bench(scene if scene.parts else casefile.muscle(scene), arguments.free_folder(store, "store"))
+        return muscle_bars.bars(bench, reference, muscle) if muscle else refinement.bars(bench, reference)
 
 
 def compare(

@@ -147,9 +147,7 @@ WHERE_LARGEST: Reading = (BEYOND, top)
 FALL: Reading = (BEYOND, lambda pressures: pressures(top(pressures)) - pressures(BEYOND))
 CELLS = {"n": 2, "element": "Q2/Q1", "material": NEARLY_INCOMPRESSIBLE}
 LIMIT = partial(
-    INFLATED,
-    measure=blown,
-    source="Green and Zerna 1954, ch. 3; Ogden 1984, ch. 5.3.2; validation/rivlin.py Sphere",
+    INFLATED, measure=blown, source="Green and Zerna 1954, ch. 3; Ogden 1984, ch. 5.3.2; validation/rivlin.py Sphere"
 )
 
 ENTRIES: tuple[Entry, ...] = (

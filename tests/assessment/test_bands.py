@@ -89,6 +89,7 @@ def test_fewer_runs_than_parameters_need_are_refused() -> None:
     assert "8 are the fewest for 3 parameters" in of_values(empty(), own, own.points).refused
 
 
+@pytest.mark.slow
 def test_what_no_surrogate_follows_has_no_sensitivities() -> None:
     """Noise: its own percentiles where there are runs enough, no band where there are not."""
     noise = np.random.default_rng(1).standard_normal((200, 3))

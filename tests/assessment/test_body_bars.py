@@ -36,6 +36,7 @@ def square_bar(element: str, cells: int) -> fr.Body:
     return fr.Body(mesh, (fr.make_effect("neo_hooke", mu=MU), resistance(element, 10.0)), fixed, (0.0, 1.0))
 
 
+@pytest.mark.slow
 @needs_fenicsx
 @pytest.mark.parametrize(
     ("element", "cells", "off"), [("Q1", 2, 0.052), ("P2/P1", 1, 0.036), ("P1", 2, 0.37), ("Q1/P0", 3, 0.024)]
@@ -52,6 +53,7 @@ def test_bars_of_a_coarse_bar_cover_the_torque_that_is_known(element, cells, off
     assert (bars.frames, bars.moments["top"][0], bars.displacement[0]) == ((0.0, 1.0), 0.0, 0.0)
 
 
+@pytest.mark.slow
 @needs_fenicsx
 @pytest.mark.parametrize(
     ("name", "element", "cells"),
@@ -76,6 +78,7 @@ def test_bars_of_a_coarse_panel_cover_its_tip(name, element, cells) -> None:
     assert f"displacement is known to {100 * bars.displacement[-1]:.2g} % of itself" in said[-1]
 
 
+@pytest.mark.slow
 @needs_fenicsx
 def test_what_is_exact_on_any_cells_has_no_bar() -> None:
     block = fr.box((2, 1, 1), (10.0, 10.0, 10.0), "tetrahedron")

@@ -42,6 +42,7 @@ def noisy(seed: int) -> Calibration:
     return fit(forward, (P1, P2), data(tension(**TRUTH) + noise), "fibre")
 
 
+@pytest.mark.slow
 def test_parameters_are_inside_their_intervals_in_19_of_20_trials() -> None:
     """Of 40 trials with 2 intervals each 76 are expected, with a standard deviation of 2.8 (errors are correlated)."""
     found = [noisy(seed) for seed in range(40)]

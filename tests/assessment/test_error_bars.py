@@ -133,6 +133,7 @@ def test_a_value_of_one_place_is_known_no_better_than_places_are_on_average() ->
     assert [one.tolist() for one in (rms, greatest, quantile, alone)] == [[0, 0.5, 1], [0, 1, 2], [0, 1, 2], [0, 0, 0]]
 
 
+@pytest.mark.slow
 def test_a_quantile_is_that_of_one_place_whose_difference_no_other_cancels() -> None:
     """Differences that are independent from place to place cancel in means, and in the 95 % quantile of a change do not."""
     covered = []

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapes
+from scipy.spatial.transform import Rotation
 
 from fem_reference.assessment.neighbours import between, depths
 from fem_reference.effects.touching import MuscleContact
@@ -60,3 +61,17 @@ def test_muscles_may_overlap_by_the_give_of_their_own_contact_alone() -> None:
     run = Run("r", "fenicsx", Outcome("converged", ""), (0, 1), cube.surface, np.stack([cube.surface.points] * 2))
     for lifted, lost in ((nodes, ["a and b in each other"]), (np.tile(mesh.points, (3, 1)) + 2 * lifts, [])):
         assert [one.name for one in between(still, run, lambda _, places=lifted: places) if not one.met] == lost
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, 1.1])
+def test_bodies_that_share_a_face_are_not_in_each_other(turn: float) -> None:
+    """Two cubes on one another, turned about an oblique axis: rounding (1e-16 of their size) is no overlap, 1e-3 mm is one."""
+    mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0))
+    lines = Polylines(np.array([[0.5, 0.5, 0.1], [0.5, 0.5, 0.9]]), np.array([0, 2]))
+    cube = MuscleProblem(shapes.skin(mesh), (), (), (0,), None, mesh=mesh, effects=(), fibres=lines)
+    problem = MusclesProblem(dict.fromkeys("ab", cube), (), None, apart=True)
+    turned = Rotation.from_rotvec(turn * np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0))
+    run = Run("r", "fenicsx", Outcome("converged", ""), (0,), cube.surface, cube.surface.points[None])
+    for lift, met in ((1.0, True), (0.999, False)):
+        nodes = turned.apply(np.concatenate([mesh.points, mesh.points + [0.0, 0.0, lift]]))
+        assert [one.met for one in between(problem, run, lambda _, places=nodes: places)] == [met]

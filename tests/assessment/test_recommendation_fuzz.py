@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -37,6 +38,7 @@ def places(table: Any, at: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return [found for key, value in inside for found in ((*at, key), *places(value, (*at, key)))]
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_whatever_a_study_says_a_recommendation_is_finite_or_refused(data: st.DataObject, tmp_path: Path) -> None:

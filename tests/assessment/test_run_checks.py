@@ -35,6 +35,7 @@ def away(problem: MuscleProblem) -> MuscleProblem:
     return replace(problem, bones=problem.bones[:2])
 
 
+@pytest.mark.slow
 def test_a_ball_that_goes_through_a_bar_that_does_not_move_is_denied(tmp_path) -> None:
     problem = coarse(tmp_path)
     run = resting(problem, contact_pressure=np.zeros(5))
@@ -138,6 +139,7 @@ def test_springs_yield_as_far_as_the_recorded_force_says(tmp_path) -> None:
     assert lost(problem, replace(run, scalars={"force_low": np.array([0.0, 0, 1, 0, 0])})) == ["springs of low, mean"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("last", "steps", "met"), [(2.0, 1, False), (2.0, 2, False), (2.0, 4, True), (20.0, 1, True)])
 def test_a_turn_takes_steps_enough(tmp_path, last, steps, met) -> None:
     # Once round by frame 2 of the first interval of 5, or a quarter of it by then.
@@ -177,6 +179,7 @@ def test_forces_that_are_not_in_balance(tmp_path) -> None:
         assert lost(replace(problem, effects=(*problem.effects, weighs)), replace(run, scalars=scalars)) == []
 
 
+@pytest.mark.slow
 def test_bones_carry_weights_and_dead_loads(tmp_path) -> None:
     """A bar of 4,000 mm3 of water weighs 39.24 mN; 1 kPa on its four free sides of 400 mm2 each is 1.6 N."""
     problem = away(coarse(tmp_path))

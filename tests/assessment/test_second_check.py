@@ -22,6 +22,7 @@ from fem_reference.verification import second_check as catalogue
 from fem_reference.verification.lab import lab
 
 
+@pytest.mark.slow
 def test_no_verdict_rests_on_a_denied_reference(tmp_path) -> None:
     problem = coarse(tmp_path)
     case, run = casefile.read(tmp_path), resting(problem)

@@ -39,6 +39,7 @@ def command(tmp_path, monkeypatch) -> str:
     return f"{shlex.quote(sys.executable)} 'my solver/relax.py' --iterations {{iterations}} {{scene}} {{out}}"
 
 
+@pytest.mark.slow
 def test_it_is_compared_studied_recommended_and_stressed(command, capsys, monkeypatch) -> None:
     monkeypatch.setattr("fem_reference.studies.cost._POWERS", ())
     own = ["--solver-command", command, "--json", "facts.json"]
@@ -95,6 +96,7 @@ def test_a_command_that_cannot_be_used_is_bad_input(command, words, problem, cap
     assert not Path("reports").exists()
 
 
+@pytest.mark.slow
 def test_a_command_that_fails_is_the_failure_of_a_solver(command, capsys) -> None:
     Path("my solver", "relax.py").write_text("raise SystemExit('no way')")
     assert cli.main(["compare", "./bar", "--solver-command", command]) == cli.SOLVER_FAILED

@@ -64,11 +64,13 @@ def test_states_of_some_frames_are_not_taken_for_those_of_all(solved, capsys) ->
     assert "without its states" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_run_with_states_is_taken_as_it_is(solved, tmp_path: Path) -> None:
     assert cli.main(solved(kept=(0, 5, 10, 15, 20))) == cli.DONE
     assert (tmp_path / "paraview" / paraview.INDEX).is_file()
 
 
+@pytest.mark.slow
 def test_asking_for_states_changes_no_key_and_solves_only_what_has_none(solved, tmp_path: Path) -> None:
     solved(kept=())
     case = fr.load_case(tmp_path / "bar", {"reference.store_state": True})

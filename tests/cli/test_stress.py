@@ -30,6 +30,7 @@ def test_runs_of_the_reference_that_nobody_would_make_are_refused(words, got, tm
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_verb_and_its_page(tmp_path, capsys) -> None:
     words = ["stress", "at_rest.millimetres", "--solver", "pbd", "--solver", "xpbd", "--out", str(tmp_path)]
     assert cli.main([*words, "--json", str(tmp_path / "facts.json"), "--quiet"]) == cli.DONE

@@ -178,8 +178,9 @@ def check_ends(name: str, facts) -> None:
         assert len(off) > 1
 
 
+@pytest.mark.nightly  # by day ``.ci/run`` runs it as it is shipped, and tests/house/test_main_job.py asks a small case
 def test_main_job(tmp_path, monkeypatch) -> None:
-    # The motion there alone, on a few tetrahedra, one surface of few Gaussians: ``.ci/run`` runs it as it is shipped.
+    # The motion there alone, on a few tetrahedra, one surface of few Gaussians.
     (few,) = (i for i, one in enumerate(CASES[MAIN_JOB].candidate) if one.solver == "rbf_muscle")
     quick = {"muscle.tet_size": "12 mm", "muscle.refinements": 0, "frames.last": 100, "frames.every": 50}
     quick[f"candidate[{few}].gaussians"] = 10

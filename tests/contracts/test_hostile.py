@@ -253,6 +253,7 @@ def test_a_run_with_another_type_is_refused(key: str, value: object, run: Path) 
     assert store.finished(run) is None
 
 
+@pytest.mark.slow
 def test_arrays_that_are_programs_or_bombs_are_refused(run: Path) -> None:
     place = run / "state" / "frame_0010.npz"
 

@@ -233,6 +233,7 @@ with new_folder(folder / "exported") as part:
 """
 
 
+@pytest.mark.slow
 def test_what_is_killed_while_it_is_written_leaves_what_was_there(tmp_path: Path) -> None:
     """And what it had begun is removed by who writes there next."""
     files.write_text(tmp_path / "page.html", "old")

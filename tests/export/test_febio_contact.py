@@ -197,6 +197,7 @@ def test_the_file_says_it_whatever_the_name(springs: MuscleProblem) -> None:
     assert any("a- -b - ->" in text and "6.667 N/mm in all for 6.667" in text for text in comments(named))
 
 
+@pytest.mark.slow
 def test_the_terminal_and_the_page_beside_the_file_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = small.write(tmp_path / "bar")
     words = ["export", str(scene), "--format", "febio", "--quiet", "--out", str(tmp_path)]

@@ -107,6 +107,7 @@ def frame(folder, i: int) -> pyvista.MultiBlock:
     return reader.read()[0]
 
 
+@pytest.mark.slow
 def test_frames_have_their_times_and_blocks_their_names(compared, exported) -> None:
     reader = pyvista.PVDReader(exported / paraview.INDEX)
     assert reader.time_values == pytest.approx([0, 0.1, 0.2, 0.3, 0.4])  # 20 ms from a frame number to the next
@@ -266,6 +267,7 @@ def exported_with(folder: Path, bones: str, effects: str):
     return setup, run, frame(folder / "out", 2)["reference"]["muscle"].point_data
 
 
+@pytest.mark.slow
 def test_contact_pressure_is_that_of_the_bones_that_contact_names(tmp_path: Path) -> None:
     # A screen as deep in the muscle as the wall, from the other side, which contact leaves alone: it presses nothing.
     screen = 'name = "screen"\nhalf_space = { point = "5, 0, 0 mm", normal = [1, 0, 0] }\n'
@@ -277,6 +279,7 @@ def test_contact_pressure_is_that_of_the_bones_that_contact_names(tmp_path: Path
     assert pressure[in_screen].tolist() == [0.0] * max(21, in_screen.sum())
 
 
+@pytest.mark.slow
 def test_in_situ_no_pressure_is_shown_that_knows_nothing_of_rest(tmp_path: Path) -> None:
     """There bones press by what balances the tension, and by the change of gaps: the law of the whole gap is another pressure."""
     tense = '[[effect]]\nname = "in_situ"\nstretch = 1.1\n'

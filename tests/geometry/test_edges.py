@@ -151,6 +151,7 @@ def test_the_difference_of_two_stretches_is_per_rest_length() -> None:
         assert_allclose(found[f"edge_extension.{name}"], 30, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_edges_weigh_by_area() -> None:
     """A box whose long half is stretched: each edge by itself, weighted by a third of its triangles."""
     points = wavy(SLAB.points, 0.4)
@@ -173,6 +174,7 @@ def test_edges_weigh_by_area() -> None:
     assert below < 0.95 <= within
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_slab_bent_into_an_arc_has_known_angles(sign: int) -> None:
     """By the angle a in n facets: a / n at the lines across, outward on one face and inward on the other, half of it at its
@@ -292,6 +294,7 @@ def test_the_report_program_measured_the_same(data, name, longer_100, longer_300
     assert bent_100 is None or np.radians(turned[1]) == pytest.approx(bent_100, abs=6e-4)
 
 
+@pytest.mark.slow
 def test_where_names_the_worst_edge() -> None:
     moved = SLAB.points.copy()
     corner = int(np.flatnonzero((SLAB.points == SIZE).all(axis=1))[0])

@@ -106,6 +106,7 @@ def test_vertices_and_corners_agree_with_what_is_attached() -> None:
     assert (corners.away[np.isin(places[:, 2], (0, 40))] == 0).all()
 
 
+@pytest.mark.slow
 def test_places_where_it_is_felt_are_between_vertices_too() -> None:
     surface, _, exempt = bar((1, 1, 1))  # all vertices are attached
     assert exempt.vertices.all()

@@ -88,6 +88,7 @@ def test_a_prism_has_the_template_to_scale() -> None:
     assert_allclose(lines.points.reshape(12, 40, 3)[:, 20, :2] / [14, 10], template(12, 0.0)[:, 0, :2], atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [10.0, 25.0])
 def test_pennate_fibres_have_the_angle_asked_for(degrees: float) -> None:
     lines = _lines(_prism(), pennation=np.radians(degrees)).points.reshape(12, 40, 3)
@@ -107,6 +108,7 @@ def test_fibres_of_a_bent_bar_are_arcs_as_long() -> None:
     assert embed(_ring(), lines.points).outside.max() < 0.05  # the sagitta of the ring's facets
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [10, 20, 40])
 def test_fibres_pass_where_a_part_of_the_outline_grows(count: int) -> None:
     """The waves more than double half of one side; fibres keep their place across the prism to a tenth of its width. With rims
@@ -117,6 +119,7 @@ def test_fibres_pass_where_a_part_of_the_outline_grows(count: int) -> None:
     assert np.ptp(lines.points.reshape(16, 40, 3)[:, :, 0], axis=1).max() < 1.4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [10, 40])
 def test_fibres_of_a_bar_that_bends_and_twists_turn_gently(count: int) -> None:
     """The bend is 80 mm / 60 mm in 39 steps, 2 degrees each; the helix of a corner, 8.9 mm from the axis, by less than 1 more.
@@ -126,6 +129,7 @@ def test_fibres_of_a_bar_that_bends_and_twists_turn_gently(count: int) -> None:
     assert _sharpest(mapped(field, contours(field, count, X), 16)) < 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pennation", [0.0, 0.3])
 @pytest.mark.parametrize("shape", [_ring, _screw, _frilled])
 def test_turned_scaled_and_renumbered_meshes_give_the_same_fibres(

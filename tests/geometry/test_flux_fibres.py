@@ -76,6 +76,7 @@ def closed_form(points: Floats) -> Floats:
     return np.asarray(along / np.linalg.norm(along, axis=1)[:, None])
 
 
+@pytest.mark.slow
 def test_directions_in_a_sheet_attached_by_its_face_are_those_of_the_closed_form() -> None:
     """The root mean square of the angles, by volume, falls with the mesh."""
     found = []
@@ -89,6 +90,7 @@ def test_directions_in_a_sheet_attached_by_its_face_are_those_of_the_closed_form
     assert found[1] < found[0] / 1.5  # the middle line between order 0 and 1 in the angle; measured 1.9
 
 
+@pytest.mark.slow
 def test_lines_in_a_sheet_are_hyperbolas_that_end_as_evenly_as_they_start() -> None:
     """``x (h - z)`` is constant: from ``x0`` on the bottom to the height ``h (1 - x0 / L)`` at the end."""
     lines = each(streamlines(area_flux(sheet(2), "bottom", "end"), 30))

@@ -46,6 +46,7 @@ def test_its_gradient_is_the_slope_of_its_level() -> None:
     np.testing.assert_allclose(np.stack(slopes, axis=1), found.level(points)[1], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_more_gaussians_fit_better_with_few_numbers() -> None:
     """642 vertices are 1926 numbers; 40 Gaussians are 160 and miss by a percent of the length at most."""
     surface = ellipsoid()
@@ -54,6 +55,7 @@ def test_more_gaussians_fit_better_with_few_numbers() -> None:
     assert errors[2] < 0.4
 
 
+@pytest.mark.slow
 def test_a_turned_scaled_and_reordered_surface_has_the_same_fit() -> None:
     surface, rng = ellipsoid(), np.random.default_rng(4)
     turn, order = np.linalg.qr(rng.normal(size=(3, 3))).Q, rng.permutation(len(surface.points))

@@ -35,6 +35,14 @@ def test_derivatives_are_those_of_differences(obstacle) -> None:
 
 
 @pytest.mark.parametrize("obstacle", EVERY)
+def test_a_geodesic_curves_along_the_normal_and_stays_on_its_level(obstacle) -> None:
+    along = Rotation.random(200, rng=3).apply([1.0, 0, 0])
+    slope, found = obstacle.level(PLACES)[1], obstacle.curving(PLACES, along)
+    assert_allclose(np.vecdot(slope, found), -obstacle.bending(PLACES, along), rtol=1e-10, atol=1e-12)
+    assert_allclose(np.cross(slope, found), 0, atol=1e-10 * np.abs(slope).max() * np.abs(found).max())
+
+
+@pytest.mark.parametrize("obstacle", EVERY)
 def test_what_is_inside_goes_to_the_surface_and_nothing_else_moves(obstacle) -> None:
     inside = obstacle.level(PLACES)[0] < 0
     assert 3 < inside.sum() < 197

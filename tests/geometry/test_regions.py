@@ -69,6 +69,7 @@ def test_samples_fill_a_body_evenly():
     )  # planes of the grid are 0.6 mm apart
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("width", "order"), [(3.0, 1.7), (0.0, 0.5)])
 def test_the_volume_of_a_region_does_not_depend_on_the_mesh(width, order):
     """By the middles of tetrahedra: an error of second order in their size where the region is smooth, of first where it

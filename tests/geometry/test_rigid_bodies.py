@@ -66,6 +66,7 @@ def _hull_distance(points: Floats, corners: Floats) -> Floats:
 
 # The triangles of a ball of radius r have edges e up to 0.083 r and lie up to e^2 / 6 r = 1.15e-3 r below it; the chords
 # of the rims r (2 pi / 1000)^2 / 8 = 1e-5. A box is its own hull: round-off.
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "corners", "within"),
     [

@@ -45,6 +45,7 @@ def _rim(surface: Surface, labels: Ints, label: int) -> Floats:
     return np.asarray(surface.points[np.intersect1d(inside, outside)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES)
 def test_a_square_on_a_face_keeps_its_area_and_outline(size: float) -> None:
     x, y, z = BOX.points.T
@@ -74,6 +75,7 @@ def test_a_disc_on_a_sphere_keeps_its_area_and_outline(size: float) -> None:
     assert np.abs(across - radius).max() < 1.0 + size**2 / (8 * radius)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES)
 def test_the_rim_of_a_face_is_its_sharp_edges(size: float) -> None:
     surface, labels, wanted = _rimmed(BOX, {"end": np.flatnonzero(BOX.points[:, 2] == 0)}, size)

@@ -42,6 +42,7 @@ def test_exact_distance_of_a_cube_inside_and_outside() -> None:
     assert signed_distances(np.zeros((0, 3)), CUBE).shape == (0,)
 
 
+@pytest.mark.slow
 def test_ball_is_as_near_as_the_sphere(ball: Grid) -> None:
     points = _shell(2, 6.0, 14.0)
     found, exact = ball.sample(points), Sphere((0, 0, 0), RADIUS).sample(points)
@@ -54,6 +55,7 @@ def test_ball_is_as_near_as_the_sphere(ball: Grid) -> None:
     assert_allclose(found.curvature, found.curvature.transpose(0, 2, 1))
 
 
+@pytest.mark.slow
 def test_error_falls_with_the_fourth_power_of_the_spacing_where_distance_is_smooth(monkeypatch) -> None:
     # The nodes get the distance to a perfect sphere: what is left is the spline's own error, of fourth order in theory.
     smooth = Sphere((0, 0, 0), RADIUS)
@@ -68,6 +70,7 @@ def test_error_falls_with_the_fourth_power_of_the_spacing_where_distance_is_smoo
     assert (orders > 0.9 * np.array([4, 3, 2])).all(), orders
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", [BALL, CUBE], ids=["ball", "cube"])
 @pytest.mark.parametrize("spacing", [2.0, 1.0])
 def test_stated_error_bounds_an_independent_sample(surface: Surface, spacing: float) -> None:
@@ -83,6 +86,7 @@ def test_stated_error_bounds_an_independent_sample(surface: Surface, spacing: fl
     assert_allclose(grid.mean_error, np.sqrt(np.mean(found**2)), rtol=0.1)
 
 
+@pytest.mark.slow
 def test_error_at_sharp_edges_falls_with_the_spacing() -> None:
     # By hand: a spline misses the tip of |x| by up to 0.34 of a spacing; across the edge of a cube the slope jumps by less.
     coarse, fine = (build(CUBE, spacing, 2.0).error for spacing in (2.2, 1.1))
@@ -188,6 +192,7 @@ def test_nothing_is_deeper_than_half_the_thickness(ball: Grid) -> None:
     assert build(shapes.sphere(3, 1.0), 3.0, 4.0).half_thickness == np.inf
 
 
+@pytest.mark.slow
 def test_place_of_the_body_does_not_matter(ball: Grid) -> None:
     moved = build(BALL.moved_to(BALL.points + SHIFT), 1.0, 4.0)
     points = _shell(7, 7.0, 13.0)
@@ -196,6 +201,7 @@ def test_place_of_the_body_does_not_matter(ball: Grid) -> None:
         assert_allclose(one, other, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_triangles_may_have_any_orientation(ball: Grid) -> None:
     triangles = BALL.triangles.copy()
     triangles[100:200] = triangles[100:200, ::-1]

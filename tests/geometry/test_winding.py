@@ -33,6 +33,7 @@ def sampled(paths: Winding, count: int) -> np.ndarray:
     return points.reshape(size, count, 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sphere", "cylinder"])
 def test_around_a_ball_or_a_roll_it_is_the_closed_form(kind) -> None:
     """The error of Runge-Kutta's method, 1e-7 of the radius for half a turn."""
@@ -76,6 +77,7 @@ def test_over_the_tube_of_a_ring(tube) -> None:
     assert_allclose(middle, [[10 - tube, 0, 0]], atol=1e-6)  # through the hole, not around
 
 
+@pytest.mark.slow
 def test_through_the_hole_of_a_ring_it_is_straight() -> None:
     ring = Ring(np.eye(4), 10.0, 2.0)
     starts, ends = np.array([[1.0, 2, 9], [8.0, 0, 0], [0, 0, 9]]), np.array([[-3.0, 1, -7], [0.0, 8, 0], [0, 0, -9]])
@@ -84,6 +86,7 @@ def test_through_the_hole_of_a_ring_it_is_straight() -> None:
     assert_allclose(paths.lengths, np.linalg.norm(ends - starts, axis=1), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_around_two_it_is_smooth_outside_and_the_same_backwards() -> None:
     starts, ends = beside(40)
     paths = around([EGG, BALL], starts, ends)
@@ -99,6 +102,7 @@ def test_around_two_it_is_smooth_outside_and_the_same_backwards() -> None:
     assert_allclose(around([BALL, EGG], ends, starts).lengths, paths.lengths, rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_directions_are_the_slopes_of_the_length() -> None:
     """Moving an end changes the length by the direction there: differences over 2e-4 mm."""
     starts, ends = beside(6)
@@ -127,6 +131,7 @@ def test_what_crosses_an_obstacle_that_is_smaller_than_a_step_has_failed(monkeyp
     assert not around([Quadric(at(0, 0, 7.3144), np.array([5.0, 0.5, np.inf]))], starts[1:], ends[1:]).failed.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [1e-12, 1e-30])
 def test_around_what_has_hardly_a_size_no_path_is_no_number(radius) -> None:
     """Newton's method cannot bend a path around it: not found, and never not-a-number."""
@@ -134,6 +139,7 @@ def test_around_what_has_hardly_a_size_no_path_is_no_number(radius) -> None:
     assert paths.failed.tolist() == [True]
 
 
+@pytest.mark.slow
 def test_a_path_that_is_no_number_has_failed(monkeypatch) -> None:
     plain = winding._geodesic
 
@@ -145,6 +151,7 @@ def test_a_path_that_is_no_number_has_failed(monkeypatch) -> None:
     assert around([BALL], np.array([[0.0, -2, 1]]), np.array([[20.0, -2, 1]])).failed.tolist() == [True]
 
 
+@pytest.mark.slow
 def test_a_tube_so_thin_that_a_string_slips_past_it_has_no_path() -> None:
     """It would take 2e7 points to follow it past a tube of 1 nm."""
     starts, ends = np.array([[12.0, 0, 9]]), np.array([[12.0, 0, -9]])

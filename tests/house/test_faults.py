@@ -80,7 +80,7 @@ def test_what_would_be_planted_is_named(monkeypatch: pytest.MonkeyPatch, capsys:
 
 
 def test_a_record_stands_while_statements_are_the_same(project: Path) -> None:
-    """Words and layout may change; a number may not, nor the statements of its tests."""
+    """Words, layout and marks of slow tests may change; a number may not, nor the statements of its tests."""
     fault, law, test = (
         Fault("one", "law.py", "a + b", "a - b", "test_law"),
         project / "law.py",
@@ -94,5 +94,8 @@ def test_a_record_stands_while_statements_are_the_same(project: Path) -> None:
     law.write_text(text.replace("= 7", "= 8"))
     assert faults.fingerprint(project, fault) != found
     law.write_text(text)
-    test.write_text(test.read_text().replace("== 5", "== 6"))
+    asked = test.read_text()
+    test.write_text(asked.replace("def test", "@pytest.mark.slow\ndef test"))
+    assert faults.fingerprint(project, fault) == found
+    test.write_text(asked.replace("== 5", "== 6"))
     assert faults.fingerprint(project, fault) != found

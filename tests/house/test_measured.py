@@ -81,6 +81,22 @@ def test_hard_cases_are_counted_and_the_ends_of_load_steps_are_read() -> None:
     assert kept["ends"] == [{"case": "twist", "verdict": "ok", "frame": 5, "off": off}]
 
 
+def test_runs_on_other_meshes_are_read() -> None:
+    """Sentences as ``studies.hard.following.on_meshes`` writes them; a case whose runs take too long has none."""
+    ended = "7 converged, 2 out of steps, 1 denied, up to frame 12 to 20, apart by 3.1 % at most, 0.2 % in the median; unstable"
+    found = {}
+    for case, sentence in (
+        ("one", f"ok; on other meshes: {ended}"),
+        ("two", "ok; no runs on other meshes, as one takes more"),
+    ):
+        found[case] = {"cells": [{"case": case, "verdict": "ok", "status": "converged", "sentence": sentence}]}
+    kept = measurements.MEASUREMENTS["stress_jitters"].keep(found)
+    assert [one["meshes"] for one in kept] == [
+        ("7 converged, 2 out of steps, 1 denied", "12 to 20", "3.1", "0.2"),
+        None,
+    ]
+
+
 def test_arms_about_an_axis_are_those_of_the_reference_and_a_pose_that_was_not_reached_has_the_status(
     monkeypatch,
 ) -> None:
@@ -94,8 +110,8 @@ def test_arms_about_an_axis_are_those_of_the_reference_and_a_pose_that_was_not_r
     ]
     keep = measurements.MEASUREMENTS["arms_rotation"].keep
     kept = {"measured": keep({"hip": {"status": "diverged", "measures": own}})}
-    monkeypatch.setattr(measurements, "kept", lambda _: kept)
-    monkeypatch.setattr(measurements, "origin", lambda _: "here")
+    monkeypatch.setattr(measurements.evidence, "kept", lambda _: kept)
+    monkeypatch.setattr(measurements.tables, "origin", lambda _: "here")
     row = measurements.TABLES["arms_rotation"]().splitlines()[2]
     assert row == "| `hip` | 32.0 (29.0 to 34.0) | 62.0 (59.0 to 64.0) | diverged |"
 
@@ -120,8 +136,8 @@ def test_the_choice_of_fibres_has_bars_of_changes_and_of_the_fibres_as_shipped_a
     assert first.startswith("hip_flexion --error-bar")
     keep = measurements.MEASUREMENTS["fibre_choice"].keep
     kept = {"measured": keep({first: run(180.0, 0.0, bars), other: run(190.0, 1.0, [])})}
-    monkeypatch.setattr(measurements, "kept", lambda _: kept)
-    monkeypatch.setattr(measurements, "origin", lambda _: "here")
+    monkeypatch.setattr(measurements.fibres, "kept", lambda _: kept)
+    monkeypatch.setattr(measurements.tables, "origin", lambda _: "here")
     row = measurements.TABLES["fibre_choice"]().splitlines()[2]
     cells = ("`hip_flexion`", "potential / by area", "180.0 / 190.0", "-3.0 ± 0.5 / -2.0")
     arms_shown = ("2.0 (-1.0 to 4.0) / 3.0 (0.0 to 5.0)", "52.0 ± 0.25 (49.0 to 54.0) / 53.0 (50.0 to 55.0)")

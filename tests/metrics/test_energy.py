@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 import small
 from numpy.testing import assert_allclose
 
@@ -23,6 +24,7 @@ def test_differences_from_the_reference_and_the_energy_itself() -> None:
     assert measure(bare, run, given, ["energy"]) == measure(run, bare, given, ["energy"]) == ()
 
 
+@pytest.mark.slow
 def test_the_bar_covers_a_mesh_of_half_the_size_which_is_softer(tmp_path: Path) -> None:
     """A bar whose end turns by 0.2 rad: of more shapes the least energy is less."""
     found = []

@@ -18,7 +18,6 @@ from fem_reference.foundations.motion import RigidMotion
 from fem_reference.io import files
 from fem_reference.metrics import MeasurementContext, at_rest, change, context_of, find, measure
 from fem_reference.metrics.fibre_length import both_lengths
-from fem_reference.metrics.joint_moment import force_arms
 from fem_reference.metrics.moment_arm import excursion_arms
 from fem_reference.problems.of_case import setup
 from fem_reference.problems.setup import Bone, Joint
@@ -120,6 +119,7 @@ def bar(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, MeasurementConte
     return run, context_of(setup(case), run)
 
 
+@pytest.mark.slow
 def test_virtual_work(bar: tuple[Run, MeasurementContext]) -> None:
     """Without dissipation the moment is minus the slope of the energy, so that its integral over the angle is the energy.
 
@@ -156,6 +156,7 @@ def test_hip_flexion_as_shipped_does_the_work_of_its_moment(tmp_path: Path) -> N
     does_the_work_of_its_moment(run, context_of(setup(case), run).joints[0])
 
 
+@pytest.mark.slow
 def test_fibres_alone_have_the_arm_of_their_excursion_and_the_whole_muscle_has_not(tmp_path: Path) -> None:
     """`hip_flexion` on coarse tetrahedra, where contact is fully made: energies by effect, from the stored unknowns, make up the
     moment to 1 % (virtual work, by parabolas over 0.2 rad, without the little energy of contact).
@@ -218,6 +219,13 @@ def test_a_case_without_a_joint_has_no_moment() -> None:
     assert measure(run, at_rest(run), replace(context(run), joints=()), ["joint_moment"]) == ()
 
 
+def force_arms(run: Run, joint: Joint) -> Floats:
+    """The arm (f,) [mm] of the force on the bone of a joint, as the metric measures it from rest at every frame."""
+    name = joint.bone.name
+    force = np.linalg.norm(run.force(name), axis=1)
+    return run.moment(name, joint.centre) @ joint.axis / np.where(force > 0, force, np.nan)
+
+
 def test_the_force_arm_of_a_straight_bar_is_its_excursion_arm() -> None:
     """A line pulls the bone that turns straight towards a fixed point: 0.1 % with a degree between frames, as excursion has it."""
     joint = lines.joint_of(np.radians(np.arange(40)))
@@ -241,6 +249,7 @@ def test_without_a_force_there_is_no_arm() -> None:
     assert_allclose(arms[1:], 32 / 5)
 
 
+@pytest.mark.slow
 def test_a_greater_scene_has_forces_and_moments_to_scale(tmp_path: Path) -> None:
     """No law has a length: all lengths ten times give arms ten times, forces 100 times and moments 1000 times.
 
@@ -301,6 +310,7 @@ def straight_arms(angle: float, beside: Floats) -> tuple[Floats, Floats]:
     return np.cross(end, start - end)[:, 0] / away, away / 40
 
 
+@pytest.mark.slow
 def test_a_muscle_that_is_nearly_a_line_has_one_arm_by_force_and_by_excursion(
     thread: tuple[Case, Run, MeasurementContext], tmp_path: Path
 ) -> None:

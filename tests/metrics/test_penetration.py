@@ -50,6 +50,7 @@ def cap(height: float) -> float:
     return np.pi * height**2 * (3 * RADIUS - height) / 3
 
 
+@pytest.mark.slow
 def test_a_ball_pressed_into_a_floor_is_as_deep_as_it_went() -> None:
     depths = np.array([-1.0, 0.0, 0.5, 3.0, 8.0])
     deepest, volume = taken(run_of(*(BALL.points - [0, 0, depth] for depth in depths)), floor(LOW))
@@ -101,6 +102,7 @@ def test_a_bone_of_triangles_is_met_in_its_own_frame() -> None:
     assert volume.values[0] == 0
 
 
+@pytest.mark.slow
 def test_the_deepest_bone_decides_and_volumes_add() -> None:
     ground, stone = floor(LOW + 2), Bone("stone", PLATE, None, solid=Sphere((0, 0, RADIUS + 5), 10.0))
     one, other, both = (taken(run_of(BALL.points), *bones) for bones in ((ground,), (stone,), (ground, stone)))
@@ -109,6 +111,7 @@ def test_the_deepest_bone_decides_and_volumes_add() -> None:
     assert "in stone" in both[0].where[0]
 
 
+@pytest.mark.slow
 def test_what_is_attached_is_exempt_and_what_is_near_to_it() -> None:
     # A cap of 3 mm is attached that is 3 mm deep in the floor.
     low = np.flatnonzero(BALL.points[:, 2] < LOW + 3)
@@ -128,6 +131,7 @@ def test_what_is_attached_is_exempt_and_what_is_near_to_it() -> None:
     assert 0.3 * whole < volume.values < 0.5 * whole  # 0.9 mm of a cap of 10.5 mm are exempt too
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("slides", "attached", "wanted", "at"), [(False, 0.5, 1.0, 0.5), (True, 2.0, 2.0, 0.0)])
 def test_where_contact_is_exempt_what_has_been_added_since_rest_counts(slides, attached, wanted, at) -> None:
     # A bar attached at z = 0, whose side x = 0 is 0.3 mm deep in a wall at rest. What is exempt beside the attachment, up to
@@ -157,6 +161,7 @@ def in_a_dent(cells: int, radius: float) -> tuple[Run, Bone]:
     return run_of(points, rest=plate), Bone("stone", PLATE, None, solid=Sphere(tuple(centre), radius))
 
 
+@pytest.mark.slow
 def test_what_flat_triangles_cut_off_a_round_bone_does_not_count_unless_they_are_large() -> None:
     # In the middle of an edge of a length it is length^2 / 8 R deep: edges of 4.2 mm, where contact is felt every 1.07 mm, follow
     # the ball; those of 14.1 mm do not.
@@ -188,6 +193,7 @@ def test_a_bone_between_the_vertices_of_a_coarse_surface_is_met() -> None:
     assert_allclose(volume.values[1], np.pi * 1**2 * (9 - 1) / 3, rtol=0.06)
 
 
+@pytest.mark.slow
 def test_of_the_run_alone_whatever_it_is_compared_with() -> None:
     pressed = run_of(BALL.points - [0, 0, 2.0], BALL.points - [0, 0, 4.0])
     rest = Setup(BALL, (floor(LOW),), (), (0, 1), None)
@@ -246,6 +252,7 @@ def test_a_bone_that_is_not_closed_has_no_inside(tmp_path, caplog) -> None:
     assert measure(run_of(BALL.points), run_of(BALL.points), MeasurementContext.of(run_of(BALL.points), FIBRE, (bone,)))
 
 
+@pytest.mark.slow
 def test_a_box_that_stands_out_on_both_sides_is_counted_whole() -> None:
     # A rod of 6 x 6 mm through the middle: 36 mm2 times 2 R, less by (x^2 + y^2) / 2 R^2 with means of 3 mm2 each.
     rod = Bone("rod", PLATE, None, solid=Box((0, 0, 0), (60, 6, 6), 0))

@@ -65,6 +65,7 @@ def block(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_mean_stress_along_a_bar_is_its_force_times_its_length(block: Path, tmp_path: Path) -> None:
     """The mean of the stress over a body is that of its tractions times their places (Gurtin 1981, the mean stress theorem): along
     a bar of 42 mm between two planes, the force times 42 mm over the volume. 1 %: fibres lean where the bar gets narrower, by

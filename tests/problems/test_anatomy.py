@@ -284,6 +284,7 @@ def test_given_fibres_are_read_and_completed(bar) -> None:
         (bar / "case.toml").write_text(text)
 
 
+@pytest.mark.slow
 def test_fibres_at_an_angle_lean_by_the_sine_of_twice_that(tmp_path) -> None:
     scene = pennate(tmp_path / "scene", "auto")
     assert estimates(scene, muscle.setup(scene)).lean == pytest.approx(np.sin(np.radians(50)))
@@ -379,6 +380,7 @@ def test_traced_fibres_of_a_straight_bar_go_straight_along_it(bar) -> None:
     assert (anatomy.lean(case, along), anatomy.lean(leaning, along)) == (0, pytest.approx(np.sin(np.radians(60))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [0, 15])
 def test_a_template_is_a_source_of_fibres(bar, degrees: int) -> None:
     """Parallel and pennate lines of a bar, whose directions are those of the case; they lean by the closed form."""

@@ -34,6 +34,7 @@ def test_neither_pressure_nor_slope_jumps() -> None:
         assert slopes[0] == pytest.approx(slopes[1], abs=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sphere", "box", "grid"])
 def test_no_way_as_long_as_the_clearance_comes_near(kind) -> None:
     shape = {"sphere": Sphere((0.0, 0.0, 0.0), 10.0), "box": Box((0.0, 0.0, 0.0), (16.0, 10.0, 6.0), 0.0)}.get(
@@ -53,10 +54,12 @@ def test_no_way_as_long_as_the_clearance_comes_near(kind) -> None:
     assert (true - clear)[some & on_grid].max() < (2 * 3**0.5 if kind == "grid" else 1e-9)
 
 
+@pytest.mark.slow
 def test_where_a_point_without_a_place_is_nobody_knows() -> None:
     assert np.isnan(ball().clearance(D)(np.array([[0.0, np.nan, 0.0], [np.inf, 0.0, 0.0]]))).all()
 
 
+@pytest.mark.slow
 def test_what_is_nowhere_as_near_as_wanted_is_clear_everywhere() -> None:
     assert (ball().clearance(-30.0)(np.zeros((2, 3))) == np.inf).all()
 
@@ -66,6 +69,7 @@ def ball() -> Grid:
     return build(tessellated(form, np.zeros((1, 3)), "ball"), 1.0, 6.0)
 
 
+@pytest.mark.slow
 def test_a_gradient_is_nowhere_steeper_than_said() -> None:
     grid = ball()
     points = np.random.default_rng(6).uniform(-18, 18, (20_000, 3))

@@ -24,6 +24,7 @@ def test_a_body_that_is_attached_to_nothing_goes_with_the_bones_beside_it(tmp_pa
     assert known.speed > 0
 
 
+@pytest.mark.slow
 def test_small_motions_are_asked_for_more_closely(tmp_path) -> None:
     scene = scene_of(tmp_path, "")
     rest = muscle.setup(scene)
@@ -59,6 +60,7 @@ def test_the_stretch_of_what_was_solved_is_that_of_the_surface_along_the_fibres(
     assert stretched(rest, rest.surface.points) == pytest.approx((1, 1))
 
 
+@pytest.mark.slow
 def test_all_that_makes_a_stress_where_nothing_else_does_is_kept(tmp_path) -> None:
     """Each alone, however small, but above what rounding makes; the line says which quantity decided, and with what number."""
     for name, more in random_scenes.EFFECTS.items():
@@ -79,6 +81,7 @@ def test_what_does_nothing_is_left_out_where_nothing_moves(tmp_path) -> None:
     assert all("kPa of stress" in str(one) for one in scene.decisions[2:])
 
 
+@pytest.mark.slow
 def test_a_motion_allows_stresses_of_its_own_size(tmp_path) -> None:
     """Bones that draw the bar a tenth longer: a strain of 0.1 in a matrix of 10 kPa; and bones that move together do not."""
     case = random_scenes.TEXT.format(**STILL | {"distance": 4.0}, choice="auto", effects="")
@@ -104,6 +107,7 @@ def test_what_happens_in_the_middle_of_a_motion_is_asked_for(tmp_path) -> None:
     assert "ball, nearest at frame 2" in str(contact)
 
 
+@pytest.mark.slow
 def test_fibres_stretched_at_rest_are_asked_for_at_that_stretch(tmp_path) -> None:
     """Slack up to 1.05, and stretched by 1.2 without any motion."""
     more = """

@@ -92,6 +92,7 @@ def test_rates_are_by_time(seconds: float, tmp_path: Path) -> None:
     assert damping.number == pytest.approx(2e-6 * speed * known.length / known.shear, rel=1e-12)  # 2 Pa s/mm2
 
 
+@pytest.mark.slow
 def test_what_a_stored_run_shows_in_one_frame_in_the_middle_is_seen(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -66,6 +66,7 @@ def deepest(rest: Setup, numbers, positions) -> np.ndarray:
     return penetration.measure(run, run, context)[0].values
 
 
+@pytest.mark.slow
 def test_a_ball_that_passes_through_is_deep_in_the_bar(tmp_path) -> None:
     rest = muscle.setup(scene(tmp_path, COARSE))
     # Its middle is 4 mm before the side, in the bar, and 8 mm behind: points drawn in it come within 0.4 mm of that.

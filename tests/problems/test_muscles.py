@@ -62,6 +62,7 @@ def case_of(folder: Path, **how):
     return casefile.read(folder)
 
 
+@pytest.mark.slow
 def test_muscles_that_cannot_come_near_do_not_touch(folder: Path) -> None:
     # 5 mm apart at rest, less what the lid moves either, and the spacing of points.
     for slide, near in ((1, False), (3, True)):
@@ -75,6 +76,7 @@ def test_muscles_that_cannot_come_near_do_not_touch(folder: Path) -> None:
         assert 5 - 2 * slide - 1 < gap < 5 - 2 * slide
 
 
+@pytest.mark.slow
 def test_a_run_whose_muscles_must_not_cross_is_another_one(folder: Path) -> None:
     """Contact that "auto" leaves out is in no equation, and yet muscles are checked: nothing unchecked is taken up for it."""
     without = of_case.chosen(case_of(folder, effects="auto", slide=1))
@@ -89,6 +91,7 @@ def test_a_run_whose_muscles_must_not_cross_is_another_one(folder: Path) -> None
     assert same.key != never.key
 
 
+@pytest.mark.slow
 def test_loads_and_bones_that_press_bring_muscles_nearer(folder: Path) -> None:
     """Muscles that the lid alone keeps 3 mm apart may touch where a load bends them, or where a bone that rests is in their way."""
     gravity = '[[effect]]\nname = "gravity"\ndensity = "1060 kg/m3"\nacceleration = "9.81, 0, 0 m/s^2"\nramp = []\n'
@@ -103,6 +106,7 @@ def test_loads_and_bones_that_press_bring_muscles_nearer(folder: Path) -> None:
     assert near == {"alone": (), "load": (("a", "b"),), "pulley": (("a", "b"),)}
 
 
+@pytest.mark.slow
 def test_each_muscle_has_its_part_of_what_is_joined(folder: Path) -> None:
     case = case_of(folder)
     problem = of_case.problem(case, of_case.setup(case))
@@ -128,6 +132,7 @@ def test_friction_between_muscles_is_that_of_the_parts_that_touch(folder: Path) 
         casefile.read(folder)
 
 
+@pytest.mark.slow
 def test_nothing_of_one_muscle_is_made_of_several(folder: Path, tmp_path: Path) -> None:
     bench = Bench(case_of(folder), tmp_path / "runs")
     with pytest.raises(InputError, match=r'"arap_pbd" for several muscles, want the reference'):
@@ -141,6 +146,7 @@ def test_nothing_of_one_muscle_is_made_of_several(folder: Path, tmp_path: Path) 
         judging.compare(bench, rest, [])
 
 
+@pytest.mark.slow
 def test_a_motion_there_and_back_between_frames_counts(folder: Path) -> None:
     """The lid slides by 3 mm up to frame 1, and is back at frame 2, where alone it would have to be looked at."""
     scene = text().replace(

@@ -16,6 +16,7 @@ from fem_reference.report.sections import origin
 from fem_reference.scenes import casefile
 
 
+@pytest.mark.slow
 def test_a_scene_keeps_what_it_needs_and_has_the_key_of_that(tmp_path) -> None:
     light, heavy = (scene_of(tmp_path / text, WEIGHT.format(density=text)) for text in ("0.001", "100000"))
     kept = [of_case.chosen(one) for one in (light, heavy)]
@@ -34,6 +35,7 @@ def test_a_scene_keeps_what_it_needs_and_has_the_key_of_that(tmp_path) -> None:
     assert str(decided) == "MuscleContact: kept, as no estimate shows what touches"
 
 
+@pytest.mark.slow
 def test_bones_that_come_nowhere_near_are_left_out_and_those_that_do_are_not(tmp_path) -> None:
     """A third bone beside the bar, which rests: 1.5 mm from where that goes, and 600 mm."""
     found = []

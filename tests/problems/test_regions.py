@@ -89,6 +89,7 @@ def test_tetrahedra_of_a_label_are_a_region(tmp_path, suffix) -> None:
             of(changes)
 
 
+@pytest.mark.slow
 def test_regions_of_one_name_are_one_and_sizes_and_overlaps_are_stated(tmp_path) -> None:
     other = AT_END | {"attachment": {"name": "insertion", "length": "10 mm"}, "width": "0 mm"}
     fat = {"name": "fat", "width": "0 mm", "surface": {"file": "end.ply", "unit": "mm"}}

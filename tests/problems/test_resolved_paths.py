@@ -108,6 +108,7 @@ def test_what_all_do_alike_is_no_travel_and_the_rest_is_bounded_by_the_size() ->
     assert len(found) < 25
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("path", "message"),
     [

@@ -179,6 +179,7 @@ def test_what_the_command_line_refuses(tmp_path, capsys, arguments, match) -> No
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_peclet_is_a_parameter_of_the_rod(tmp_path, capsys) -> None:
     # At 10 the listing solves 10 psi'' = 1/10, 10 psi'(1) = -1: psi(1) = 1/200 - 1/10 - 1/100 = -0.105.
     arguments = ["run", "rod", "--solver", "listing", "--out", str(tmp_path), "--quiet"]

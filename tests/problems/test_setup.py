@@ -46,6 +46,7 @@ def held(*vertices: list[int]) -> Setup:
     return Setup(BALL, bones, attached, (0, 1), None)
 
 
+@pytest.mark.slow
 def test_a_surface_in_a_file_has_its_distance_with_what_is_inside_below_zero(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("fem_reference.problems.setup.kept_distances", lambda: tmp_path)
     shape = Bone("ball", BALL, None).shape

@@ -64,6 +64,7 @@ def test_a_prestretch_counts_by_what_it_changes_of_the_rest() -> None:
     assert found.added == pytest.approx([mu * (stretch**2 - 1 / stretch) * np.sqrt(2 / 3)], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_fibres_that_were_stretched_after_all_are_added(tmp_path) -> None:
     """They are slack up to more than is guessed of the turn, and the run stretched them by more than that."""
     scene = of_case.chosen(scene_of(tmp_path, small.FIBRES.format(slack=1.3)))
@@ -86,6 +87,7 @@ def test_an_effect_whose_stress_is_no_number_is_needed(tmp_path) -> None:
         assert [one.effect.title for one in watch.see(0, rest, rest)] == titles
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tense", [False, True])
 def test_in_situ_an_effect_is_judged_by_the_estimate(tmp_path, tense) -> None:
     """What acts there, without the stress at rest that balances it, is no measure: 1 MPa, of which 1 kPa would be nothing."""
@@ -100,6 +102,7 @@ def test_in_situ_an_effect_is_judged_by_the_estimate(tmp_path, tense) -> None:
     assert [one.effect.title for one in watch.end()] == wanted
 
 
+@pytest.mark.slow
 def test_what_loads_move_has_a_speed(tmp_path, monkeypatch) -> None:
     """Bones rest, so that there is no drag by what is known before; the solution moves."""
     made = solved_as(
@@ -113,6 +116,7 @@ def test_what_loads_move_has_a_speed(tmp_path, monkeypatch) -> None:
     assert [len(titles) for titles in made] == [3, 4]
 
 
+@pytest.mark.slow
 def test_at_its_end_a_run_is_judged_by_the_stress_that_there_was(tmp_path, monkeypatch) -> None:
     """Bones draw at springs that yield: the matrix is hardly strained, and the weight is more than was thought beside it."""
     weight = random_scenes.EFFECTS["gravity"].format(density=10.0, weight="0, 0, -9.81")

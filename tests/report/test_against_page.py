@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pytest
 
 from fem_reference import report
 from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
@@ -11,6 +12,7 @@ from tests.assessment.test_versions import pair
 from tests.report import comparisons
 
 
+@pytest.mark.slow
 def test_the_page_has_its_table_curves_and_place(comparison, tmp_path) -> None:
     bars = (ErrorBar("deviation", "surface_deviation", "rms", "mm", np.full(5, 5.0), {}),)
     found = pair(comparison, ErrorBars(comparisons.NUMBERS, (1.0, 2.0), 2.0, bars))

@@ -2,11 +2,14 @@
 
 from dataclasses import replace
 
+import pytest
+
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.report.at_frames import label
 from tests.report.comparisons import html
 
 
+@pytest.mark.slow
 def test_a_frame_is_its_number_with_what_is_known_there(comparison):
     assert label(comparison.scene, comparison.setup, 20) == "frame 20 (plate 28.6°)"  # half of 1 rad
     text = html(comparison)

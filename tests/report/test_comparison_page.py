@@ -12,6 +12,7 @@ from fem_reference.scenes import casefile
 from tests.report.comparisons import NAN, NUMBERS, alone, ball, html, measured, with_bars
 
 
+@pytest.mark.slow
 def test_page_names_everything_and_needs_no_network(comparison, tmp_path):
     text = report.write(report.of_comparison(comparison), tmp_path / "new" / "out", report.NAME).read_text(
         encoding="utf-8"
@@ -34,6 +35,7 @@ def test_page_names_everything_and_needs_no_network(comparison, tmp_path):
     assert not re.search(r"<script|<link|<iframe|@import|url\((?!#)|http(?!-equiv)", bare)
 
 
+@pytest.mark.slow
 def test_every_id_on_the_page_is_unique_and_every_reference_meets_one(comparison):
     text = html(comparison)
     ids = re.findall(r'\bid="([^"]*)"', text)
@@ -48,6 +50,7 @@ def test_reference_without_candidates_has_the_same_page(comparison, tmp_path):
     assert {row["candidate"] for row in report.summary(alone(comparison))["measures"]} == {"reference"}
 
 
+@pytest.mark.slow
 def test_how_well_the_reference_is_known_is_reported(comparison):
     assert "With <code>--error-bar</code> the reference is also solved" in html(comparison)
     text = html(with_bars(comparison))
@@ -79,6 +82,7 @@ def test_how_well_the_reference_is_known_is_reported(comparison):
     assert (found[1]["model"], found[1]["unit"]) == (pytest.approx(3 / 70), "%")
 
 
+@pytest.mark.slow
 def test_candidates_are_ranked_where_the_reference_is_known(comparison):
     assert "Ranking by deviation" not in html(comparison)
     known = with_bars(comparison)
@@ -89,12 +93,14 @@ def test_candidates_are_ranked_where_the_reference_is_known(comparison):
     assert [row["rank"] for row in ranked if row["by"] == "Surface, rms"] == [[1, 1], [2, 2]]
 
 
+@pytest.mark.slow
 def test_a_scene_that_differs_from_its_file_is_reported(comparison):
     damaged = replace(comparison, scene=casefile.read(comparison.scene.place, with_negative_control=True))
     assert "effect[0].mu" not in re.sub(r"<pre>.*</pre>", "", html(comparison), flags=re.DOTALL)
     assert "<th>effect[0].mu</th><td>0.01 in the file, 0.001 here</td>" in html(damaged)
 
 
+@pytest.mark.slow
 def test_a_reference_turned_inside_out_is_reported(comparison):
     assert "inside out. At" not in html(alone(comparison))
     scalars = {"min_det_F_points": np.array([1, 0.5, -0.25, 0.5, NAN])}
@@ -102,6 +108,7 @@ def test_a_reference_turned_inside_out_is_reported(comparison):
     assert re.search(r"at points falls to \N{MINUS SIGN}0.250: there the reference is turned", html(turned))
 
 
+@pytest.mark.slow
 def test_a_reference_that_is_unstable_is_reported(comparison):
     def rendered(modes):
         scalars = {"negative_modes": np.array(modes)}
@@ -113,11 +120,13 @@ def test_a_reference_that_is_unstable_is_reported(comparison):
     )
 
 
+@pytest.mark.slow
 def test_effects_are_reported_with_their_units(comparison):
     assert comparison.scene.effects[0].parameters == [("mu", 0.01, "MPa")]
     assert "<tr><th>NeoHooke</th><td>mu = 0.01 MPa</td></tr>" in html(comparison)
 
 
+@pytest.mark.slow
 def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(comparison):
     positions = np.array(comparison.reference.positions)
     positions[3:] = NAN
@@ -151,6 +160,7 @@ def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(compari
     assert 'type="module"' not in text
 
 
+@pytest.mark.slow
 def test_what_each_frame_of_the_reference_took_is_shown_where_it_is_known(comparison):
     seconds = {"seconds_processor": np.arange(5.0), "contact_points": np.array([0.0, 0, 17, 0, NAN])}
     known = replace(alone(comparison), reference=replace(comparison.reference, scalars=seconds))

@@ -22,6 +22,7 @@ def test_curves_show_where_a_run_is_not_a_number(comparison):
     assert all(svg.startswith("<svg viewBox=") for svg in drawn.values())
 
 
+@pytest.mark.slow
 def test_curves_have_a_band_as_wide_as_the_error_bar(comparison):
     bare, banded = curves(comparison), curves(with_bars(comparison))
     printed = {curve.title: "error bar" in curve.markup for curve in banded}
@@ -47,6 +48,7 @@ def test_candidates_share_one_colour_scale_and_one_axis(comparison):
     assert surface_limits(alone(comparison)) == (0.0, 1.04, False)
 
 
+@pytest.mark.slow
 def test_each_of_nine_candidates_has_a_colour_of_its_own_in_the_key_and_in_the_curves(comparison):
     quick = comparison.candidates[0]
     many = tuple(replace(quick, name=f"quick{i}") for i in range(9))
@@ -75,6 +77,7 @@ def with_joint(comparison: Comparison, angles: tuple[float, ...]) -> Comparison:
     return replace(comparison, changes=changes, context=replace(comparison.context, bones=(bone,), joints=(joint,)))
 
 
+@pytest.mark.slow
 def test_moment_arms_stand_over_the_angle_of_the_joint_in_degrees(comparison):
     drawn = {one.title: one.markup for one in curves(with_joint(comparison, (0, 0.25, 0.5, 0.75, 1.0)))}
     arms = "Moment arm, mean over the fibres"
@@ -89,6 +92,7 @@ def test_moment_arms_stand_over_the_angle_of_the_joint_in_degrees(comparison):
     assert "torn" not in over_angle  # has no arms
 
 
+@pytest.mark.slow
 def test_no_curve_over_an_angle_that_does_not_change(comparison):
     drawn = [one.title for one in curves(with_joint(comparison, (0.5,) * 5))]
     assert "Moment arm, mean over the fibres" in drawn

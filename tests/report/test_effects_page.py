@@ -4,6 +4,8 @@ import json
 import re
 from dataclasses import replace
 
+import pytest
+
 from fem_reference import report
 from fem_reference.assessment.omissions import CaseOmissions, Omission
 from fem_reference.report import effects_page
@@ -19,6 +21,7 @@ def test_the_page_says_what_each_changes_and_what_it_saves() -> None:
     assert kept == "The material itself is never left out: neo hooke."
 
 
+@pytest.mark.slow
 def test_a_prediction_stands_beside_what_was_measured_where_there_is_one(tmp_path) -> None:
     page = report.write(effects_page.page(found()), tmp_path, "effects")
     assert "surface deviation, rms: 2.50" in page.read_text(encoding="utf-8")

@@ -12,6 +12,7 @@ from fem_reference.report import estimation_page
 from tests.assessment.test_estimation import found
 
 
+@pytest.mark.slow
 def test_the_page_and_its_numbers(tmp_path) -> None:
     path = report.write(estimation_page.page(found()), tmp_path / "new", "estimation")
     text, numbers = path.read_text(), json.loads((path.parent / "estimation.json").read_text())
@@ -32,6 +33,7 @@ def test_the_page_and_its_numbers(tmp_path) -> None:
     assert "22 to 22 times fewer numbers" in estimation_page.said(found())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lacking", [("curves",), ("fits",), ("curves", "fits", "heights")])
 def test_what_was_not_measured_is_not_said(lacking, tmp_path) -> None:
     """Of fibres of few points there are no curves, and none that deviates least."""

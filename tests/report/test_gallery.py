@@ -43,6 +43,7 @@ def test_shots_are_the_worst_frames_that_can_be_drawn(comparison):
     np.testing.assert_array_equal(quick.outline, comparison.reference.positions[4])
 
 
+@pytest.mark.slow
 def test_a_candidate_without_a_frame_to_draw_is_reported(comparison, monkeypatch):
     lost = a_run("torn", "recorded", np.full_like(comparison.reference.positions, np.inf), "diverged")
     changed = replace(comparison, candidates=(comparison.candidates[0], lost))

@@ -8,6 +8,7 @@ from fem_reference import report
 from tests.report.examples import plate
 
 
+@pytest.mark.slow
 def test_a_muscle_and_a_field_have_a_page_of_one_kind_with_the_same_files(comparison, tmp_path) -> None:
     for i, one in enumerate((comparison, plate(tmp_path / "plate"))):
         page = report.of_comparison(one)

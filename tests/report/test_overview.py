@@ -47,6 +47,7 @@ def test_a_doubtful_reference_is_printed_with_its_reason(comparison) -> None:
     assert "reference: doubtful, unstable equilibrium in 1 of 5 frames" in comparison_text(doubtful).splitlines()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "metric", "said"), [(0.1, "joint_moment", 1), (None, "joint_moment", 0), (0.1, "volume", 0)]
 )

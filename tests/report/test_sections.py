@@ -45,6 +45,7 @@ def rendered() -> dict[str, str]:
     return {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_section_is_shown_where_its_numbers_exist_and_absent_where_they_do_not(comparison, name, rendered):
     """The contract of sections, met by every file of report/sections."""
@@ -55,6 +56,7 @@ def test_a_section_is_shown_where_its_numbers_exist_and_absent_where_they_do_not
         assert len(ids) == len(set(ids))
 
 
+@pytest.mark.slow
 def test_every_section_stands_on_the_page_once(comparison):
     text = html(with_bars(comparison))
     assert [text.count("<section>"), text.count("</section>")] == [len(NAMES)] * 2

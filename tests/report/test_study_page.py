@@ -119,6 +119,7 @@ def test_a_solver_that_time_does_not_help_is_said_to_be_so() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_page_shows_what_was_left_out_and_why(tmp_path) -> None:
     failed = Point("hip", "xpbd", "xpbd", "sweeps", "<b>1</b>", {}, "diverged", "frame 3: & lost")
     path = report.write(
@@ -163,6 +164,7 @@ def test_tables_compare_at_the_same_cost_and_never_at_the_same_settings() -> Non
         assert all(point.costs["seconds_per_frame"] <= row.at for point in row.best.values())
 
 
+@pytest.mark.slow
 def test_columns_of_all_tables_have_one_order_and_the_best_of_a_row_is_marked(tmp_path) -> None:
     text = report.write(study_page.page(Study((study(),))), tmp_path, "study").read_text(encoding="utf-8")
     heads = re.findall(r"at most</small></th>(.*?)</tr>", text)
@@ -175,6 +177,7 @@ def test_columns_of_all_tables_have_one_order_and_the_best_of_a_row_is_marked(tm
     assert all(row.count('class="best"') == 1 for row in rows)
 
 
+@pytest.mark.slow
 def test_numbers_of_the_page_are_valid_json_with_every_point(tmp_path) -> None:
     report.write(study_page.page(Study((study(),), {}, {"machine": "here"})), tmp_path, "study")
     found = json.loads(
@@ -186,6 +189,7 @@ def test_numbers_of_the_page_are_valid_json_with_every_point(tmp_path) -> None:
     assert len(data["cases"][0]["points"]) == 8
 
 
+@pytest.mark.slow
 def test_settings_are_tried_on_cases_that_they_were_not_chosen_on(tmp_path) -> None:
     whole = Study(tuple(study(case) for case in ("hip", "knee", "jaw")), {}, {"machine": "here"})
     text = report.write(study_page.page(whole), tmp_path, "study").read_text(encoding="utf-8")
@@ -228,6 +232,7 @@ def test_the_page_says_that_the_bar_is_in_its_table() -> None:
     assert "reference, as it is, the truth itself" in plain
 
 
+@pytest.mark.slow
 def test_times_of_a_machine_that_was_busy_are_marked() -> None:
     case = study()
     timed = (replace(one, costs=one.costs | {LOAD: 0.25 if one.value == "4" else 0.05}) for one in case.points)
@@ -238,6 +243,7 @@ def test_times_of_a_machine_that_was_busy_are_marked() -> None:
     assert warning not in study_page.text(Study((case,)))
 
 
+@pytest.mark.slow
 def test_it_says_first_what_to_take_and_so_does_recommend() -> None:
     """Errors of fenicsx fall from 0.8 mm by first order, those of pbd from 11.3 mm by half an order; the bar is 0.2 mm."""
     case = study()
@@ -262,6 +268,7 @@ def test_it_says_first_what_to_take_and_so_does_recommend() -> None:
     assert "<li>" not in study_page.page(Study((replace(case, points=()),))).html().split("</header>")[0]
 
 
+@pytest.mark.slow
 def test_of_several_cases_each_answers_in_its_own_section() -> None:
     shown = study_page.page(Study((study(), study("knee")))).html()
     assert "<li>Within" not in shown[: shown.index("</header>")]

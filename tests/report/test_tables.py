@@ -103,6 +103,7 @@ def test_bars_are_those_of_their_frames_and_attachments_apart(comparison):
     }
 
 
+@pytest.mark.slow
 def test_csv_has_the_same_numbers(comparison, tmp_path):
     report.write(report.of_comparison(comparison), tmp_path / "out", report.NAME)
     rows = list(csv.DictReader(io.StringIO((tmp_path / "out" / "measures.csv").read_text())))

@@ -44,6 +44,7 @@ def test_page_shows_everything_and_needs_no_network() -> None:
     assert not re.search(r"<script|<link|<iframe|@import|url\((?!#)|http(?!-equiv)", bare)
 
 
+@pytest.mark.slow
 def test_experiments_stand_apart_and_outside_is_no_failure() -> None:
     one = made("cube", 2.5, kind="experiment", pinned=2.5, group="experiments")
     alone, both = verification(one), verification(made(), one)
@@ -58,6 +59,7 @@ def test_experiments_stand_apart_and_outside_is_no_failure() -> None:
     assert "experiments met" not in verify_page.page(verification(made())).html()
 
 
+@pytest.mark.slow
 def test_every_id_is_unique_and_every_reference_meets_one() -> None:
     results = [
         made(name, value, order=2.0, ladder=LADDER) for name, value in (("bar", 2.0), ("tip", 3.0), ("rod", NAN))

@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats, TetMesh
 from fem_reference.runs import stress_statistics
 from fem_reference.runs.results import Results
 from fem_reference.runs.states import NodalState
-from fem_reference.runs.stress_statistics import STATISTICS, stress_scalars
+from fem_reference.runs.stress_statistics import STATISTICS, stress_scalars, volume_ratio
 from tests.runs.test_results import FIBRE, FIBRES, MATRIX, MESH, MU, affine, make, moved, nodes
 
 
@@ -80,3 +80,13 @@ def test_what_is_inside_out_has_no_statistics() -> None:
     folded[0, :, 0] = -2 * nodes(MESH, 2)[0, :, 0]
     found = stress_scalars(Results(MESH, MATRIX, {0.0: replace(state, displacement=folded)}, FIBRES), 0.0)
     assert np.isnan(list(found.values())).all()
+
+
+def test_the_volume_of_a_quadratic_displacement_is_exact() -> None:
+    """With ``u = b x^2`` along each axis, det F is a product of three ``1 + 2 b x``, whose integrals are those of the axes."""
+    b, sizes = np.array([0.03, -0.02, 0.04]), np.array([4.0, 6.0, 8.0])
+    state = moved(lambda X: b * X**2)
+    assert volume_ratio(MESH, state) == pytest.approx(np.prod(1 + b * sizes), rel=1e-13)
+    assert volume_ratio(MESH, moved(affine(np.diag([1.1, 0.9, 1.2])), degree=1)) == pytest.approx(
+        1.1 * 0.9 * 1.2, rel=1e-13
+    )

@@ -230,6 +230,7 @@ def test_scaling_reaches_the_volume_where_all_is_free():
     np.testing.assert_allclose(found.mean(axis=0), surface.points.mean(axis=0), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_volume_step_misses_the_volume_and_costs_energy():
     # Report 6.2: attached vertices do not scale, and what scaling gains the next iteration takes back.
     setup = attached_setup(None, SWING, last=10)

@@ -118,6 +118,7 @@ def test_frames_that_are_not_of_the_scene_are_not_taken(bar, tmp_path, line, sta
     assert re.search(message, outcome.message), outcome.message
 
 
+@pytest.mark.slow
 def test_the_unit_is_that_of_the_settings_or_of_the_frames(bar, tmp_path) -> None:
     told = "\n(out / 'candidate.toml').write_text('unit = \"m\"')"
     for text, more in (

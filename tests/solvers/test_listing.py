@@ -231,6 +231,7 @@ def test_the_size_of_the_domain_is_not_felt(name):
     )
 
 
+@pytest.mark.slow
 def test_the_number_of_points_is_felt():
     # A layer as wide as a few edges: the finer the grid, the nearer the plate comes to b / 0.05 = 20 in both components.
     highest = []

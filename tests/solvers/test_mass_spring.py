@@ -127,6 +127,7 @@ def test_moved_with_both_its_bones_a_muscle_comes_to_rest_undeformed() -> None:
     assert outcome.message.startswith("60 frame numbers of ")
 
 
+@pytest.mark.slow
 def test_half_the_time_step_halves_the_error_of_a_motion() -> None:
     wanted = [solved(bar(BEND), time_step=f"{step} us")[1][-1].surface for step in (4, 2, 1)]
     first, second = (np.abs(one - other).max() for one, other in pairwise(wanted))

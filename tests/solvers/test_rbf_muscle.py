@@ -21,6 +21,7 @@ def run(setup: Setup, **changes):
     return outcome, {frame.number: frame.surface for frame in frames}
 
 
+@pytest.mark.slow
 def test_a_muscle_whose_bones_move_alike_moves_with_them() -> None:
     setup = attached_setup(SWING, SWING, last=10)
     outcome, frames = run(setup)
@@ -30,6 +31,7 @@ def test_a_muscle_whose_bones_move_alike_moves_with_them() -> None:
     assert_allclose(run(setup, iterations=100)[1][10], apply(SWING.pose(10), setup.surface.points), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_volume_is_kept_and_lost_without_it() -> None:
     pull = RigidMotion((0, 0, 1), None, (0.0, 10.0), (0.0, 15.0))
     setup = attached_setup(None, pull, last=10)
@@ -41,6 +43,7 @@ def test_the_volume_is_kept_and_lost_without_it() -> None:
     assert kept < 0.01 < lost
 
 
+@pytest.mark.slow
 def test_bones_are_avoided() -> None:
     """A ball of 8 mm comes 10 mm into the side of the muscle, whose half width is 20 mm."""
     surface, ball = muscle(), shapes.sphere(2, 8.0)

@@ -43,6 +43,7 @@ def solved(given: MuscleProblem, **changes) -> tuple[viper.Rods, list]:
     return model, frames
 
 
+@pytest.mark.slow
 def test_a_rod_stretched_by_s_has_its_radius_over_the_root_of_s() -> None:
     model, frames = solved(bar(high=PULL), iterations=400)
     # The volume pi r^2 l is that of rest, with l 1.21 times as long in every segment.
@@ -77,6 +78,7 @@ def test_a_muscle_whose_bones_move_alike_moves_with_them(rods) -> None:
     assert_allclose(frames[-1].fibres, apply(SWING.pose(10), given.fibres.points), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_twisted_rod_turns_evenly_along_its_length() -> None:
     model, _ = solved(bar(high=TWIST), iterations=400)
     angles = 2 * np.arctan2(model.turns[0, :, 3], model.turns[0, :, 0])
@@ -98,6 +100,7 @@ def test_without_bending_frames_follow_their_segments_alone() -> None:
     assert np.abs(model.turns - before).max() > 0.01
 
 
+@pytest.mark.slow
 def test_a_bent_rod_is_symmetric() -> None:
     """Both ends turned in opposite directions about the middle of the rod, which is in the plane of symmetry."""
     one, other = (RigidMotion((1, 0, 0), (5, 5, z), (0.0, 10.0), (0.0, turn)) for z, turn in ((0, 0.4), (LENGTH, -0.4)))
@@ -109,6 +112,7 @@ def test_a_bent_rod_is_symmetric() -> None:
     assert_allclose(tangents[::-1] * [1, -1, 1], tangents, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_bundle_gets_thinner_as_its_rods_do() -> None:
     wide = {}
     for bundle in (0.0, 1.0):
@@ -149,6 +153,7 @@ def scene(given: MuscleProblem, pose: np.ndarray, scale: float, order: np.ndarra
     return replace(given, surface=surface, bones=bones, attached=attached, fibres=fibres)
 
 
+@pytest.mark.slow
 def test_a_scene_turned_scaled_and_renumbered_has_the_same_answer() -> None:
     given, random = bar(rods=16), np.random.default_rng(4)
     order, rods = random.permutation(len(given.surface.points)), random.permutation(16)
@@ -159,6 +164,7 @@ def test_a_scene_turned_scaled_and_renumbered_has_the_same_answer() -> None:
     assert np.abs(frames[-1].surface - given.surface.points).max() > 5
 
 
+@pytest.mark.slow
 def test_bones_are_avoided() -> None:
     """A ball of 6 mm comes 9 mm from far away towards the middle of the bar."""
     ball, place = shapes.sphere(2, 6.0), np.array([25.0, 5.0, 15.0])

@@ -276,6 +276,7 @@ def test_bones_carry_what_is_attached_and_the_volume_is_kept():
     assert cost["seconds_compile"] > 0
 
 
+@pytest.mark.slow
 def test_the_state_in_the_end_knows_neither_steps_nor_sweeps():
     # A bone pulls for 20 frames and rests for 40; a hundred times the mass of muscle makes the time step short beside what moves.
     # Measured: apart by 0.002 mm where the muscle moved by 3 mm; 1 % is allowed.

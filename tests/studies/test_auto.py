@@ -107,6 +107,7 @@ def test_explain_says_so_before_anything_is_solved(tmp_path, capsys) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_an_effect_that_turns_out_to_matter_is_added(tmp_path, monkeypatch, caplog) -> None:
     """The run goes into the ball that the guess, made blind here, did not see."""
     solved, reached = [], []

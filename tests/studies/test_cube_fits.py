@@ -6,6 +6,7 @@ from fem_reference.assessment.muscle_cubes import QUANTITIES
 from fem_reference.studies.cube_fits import collagen_law, shipped_law
 
 
+@pytest.mark.slow
 def test_the_fitted_shear_modulus_is_near_that_of_linear_elasticity() -> None:
     """Poisson ratios of 0.36 and 0.64 across want c / (2 mu) = 1 / 0.36 - 2 = 0.78 and mu = 64 kPa. The ratio of stresses, which
     would have the fibres vanish, and a strain of 10 % take it to within a fifth of that. It is far above what is published.
@@ -20,6 +21,7 @@ def test_the_fitted_shear_modulus_is_near_that_of_linear_elasticity() -> None:
     assert found.converged
 
 
+@pytest.mark.slow
 def test_a_fit_that_runs_out_of_evaluations_says_so() -> None:
     found = collagen_law(1)
     assert (found.converged, found.evaluations) == (False, 1)

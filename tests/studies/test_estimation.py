@@ -38,6 +38,7 @@ def test_a_chord_of_an_arc_misses_it_by_its_sagitta() -> None:
     assert short == {4}, "of six points four are known; six leave none to compare with"
 
 
+@pytest.mark.slow
 def test_a_flat_attachment_has_no_error_and_a_ball_is_fitted() -> None:
     """A plane is a polynomial of (3.10) whatever the centres; a ball is a level of Gaussians in one place."""
     surface = shapes.skin(shapes.box((12, 12, 2), (24.0, 20.0, 4.0)))

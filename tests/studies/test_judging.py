@@ -14,6 +14,7 @@ from fem_reference.studies.execution import Bench
 from fem_reference.studies.judging import ladders
 
 
+@pytest.mark.slow
 def test_a_frame_that_was_not_reached_is_no_number_and_no_pass(tmp_path: Path) -> None:
     bench = Bench(casefile.read_muscle(small.write(tmp_path / "bar")), tmp_path / "runs")
     built, numbers = bench.problem(), bench.scene.numbers

@@ -187,6 +187,7 @@ def inside(points, number):
     return points + (off * (z > 15) * (z < 25) * 0.5 * number)[:, None] * np.array([0.0, 0.0, 1.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stored", [False, True])
 def test_fibres_that_are_stretched_inside_only_are_added(stored, tmp_path, monkeypatch, caplog) -> None:
     """The surface rests, and the guess with it: only tetrahedra show it, of a run that is made and of one that is found stored."""
@@ -204,6 +205,7 @@ def test_fibres_that_are_stretched_inside_only_are_added(stored, tmp_path, monke
     assert "FibrePassive" in run.origin["effects"]
 
 
+@pytest.mark.slow
 def test_a_run_that_was_watched_to_its_end_is_not_watched_again(tmp_path, monkeypatch) -> None:
     made = solved_as(monkeypatch, lambda points, _: points)
     scene = pennate(tmp_path / "scene", "auto", random_scenes.EFFECTS["fibre_passive"].format(**STILL))

@@ -100,6 +100,7 @@ def test_validate_says_what_a_scene_is_and_costs(stl: Path, capsys) -> None:
     assert 'element: got "P9"' in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_case_runs_with_its_negative_control(tmp_path: Path, capsys) -> None:
     words = ["rod", "--candidate", "listing", "--quiet", "--out", str(tmp_path)]
     assert cli.main(["compare", *words]) == cli.DONE

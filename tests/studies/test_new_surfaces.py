@@ -126,6 +126,7 @@ def test_surfaces_that_are_apart_are_refused(tmp_path: Path, capsys) -> None:
 NAMES = st.text(st.characters(exclude_characters="/\0", codec="utf-8"), min_size=1, max_size=240)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(muscle=NAMES, low=NAMES, high=NAMES)
 @example(muscle='a "quote"', low="back\\slash", high="new\nline")

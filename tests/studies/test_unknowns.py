@@ -41,6 +41,7 @@ def test_keys_count_in_the_file_whatever_is_left_out(auto: MuscleCase) -> None:
     assert not any("contact" in title for title in varied.fixed())
 
 
+@pytest.mark.slow
 def test_a_range_of_an_effect_that_is_left_out_is_refused(auto: MuscleCase, tmp_path: Path) -> None:
     soft = Uncertain(key="effect[2].stiffness", low="10 kPa/mm", high="20 kPa/mm", source="made up")
     case = auto.model_copy(update={"uncertain": (STRESS, soft)})

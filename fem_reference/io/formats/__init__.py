@@ -17,12 +17,11 @@ from fem_reference.io.soup import Soup
 
 @dataclass(frozen=True)
 class Format:
-    """A mesh format, known by the ``suffixes`` of its files, in lower case with their dots.
-
-    ``read``: returns points and triangles as in the file; raises any exception where the file is incomplete. ``write``: writes the
-    surface and, if the format has point data, its displacement (n, 3) [mm]; None where the format can only be read.
-    ``shares_points``: True where triangles index a common list of points, whose order is kept; else each has its own three points.
-    ``states_size``: True where a file states its size; else truncation between two of its lines goes unnoticed.
+    """A mesh format, recognised by the ``suffixes`` of its files, in lower case with their dots. ``read``: returns points and
+    triangles as in the file; raises any exception if the file is incomplete. ``write``: writes the surface and, if the format has
+    point data, its displacement (n, 3) [mm]; None if the format can only be read. ``shares_points``: True if triangles index a
+    common list of points, whose order is kept; otherwise each has its own three points. ``states_size``: True if a file states its
+    size; otherwise truncation between two lines is not noticed.
     """
 
     suffixes: tuple[str, ...]
@@ -34,7 +33,7 @@ class Format:
 
 @cache
 def formats() -> dict[str, Format]:
-    """Every format, by the suffix of its files; TypeError where a module defines none, or the suffix of another."""
+    """Every format, by the suffix of its files; TypeError if a module defines no format, or the suffix of another format."""
     found: dict[str, Format] = {}
     for name in (name for name in modules.names(__path__) if not name.startswith("_")):
         one = vars(importlib.import_module(f"{__name__}.{name}")).get("FORMAT")

@@ -22,7 +22,7 @@ _COMPONENTS |= dict.fromkeys(("GLOBAL_IDS", "PEDIGREE_IDS", "EDGE_FLAGS"), 1)
 
 
 def read(data: bytes) -> DataSet:
-    """The data set of a file; other sections are skipped. ValueError or another exception where it is incomplete."""
+    """The data set of a file; other sections are skipped. ValueError or another exception if it is incomplete."""
     head = _HEAD.match(data)
     if head is None:
         raise ValueError("no head of a VTK file")
@@ -65,7 +65,7 @@ class _File:
         return words
 
     def array(self, number: str, kind: str, components: int = 1) -> Any:
-        """``number`` times ``components`` values of a ``kind``; ValueError where there are fewer."""
+        """``number`` times ``components`` values of a ``kind``; ValueError if there are fewer."""
         if kind.lower() not in _TYPES:
             raise ValueError(f'numbers of type "{kind}"')
         dtype, count = np.dtype(">" + _TYPES[kind.lower()]), whole_number(number, "a count") * components
@@ -108,7 +108,7 @@ class _File:
         return self.array(count, words[1])
 
     def skip(self, name: str, words: list[str]) -> None:
-        """Skip a section, which begins with a line of ``words``; ValueError where its arrays are incomplete."""
+        """Skip a section, which begins with a line of ``words``; ValueError if its arrays are incomplete."""
         of_bytes = "float" if self.text else "unsigned_char"
         if name in ("POINT_DATA", "CELL_DATA"):
             self.values = words[1]

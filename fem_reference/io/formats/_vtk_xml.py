@@ -1,6 +1,6 @@
 """VTK's XML formats, read with numpy alone: no array is larger than the bytes of the file allow.
 
-VTK's own readers are native code that trusts a file: a wrong number in it crashes or hangs the process.
+VTK's own readers are native code that trusts a file: a wrong number in the file crashes or hangs the process.
 """
 
 import base64
@@ -27,7 +27,7 @@ _MOST = 2**28
 
 
 def read(data: bytes) -> DataSet:
-    """The data set of a file, with its pieces joined; ValueError or another exception where it is invalid or incomplete."""
+    """The data set of a file, with its pieces joined; ValueError or another exception if it is invalid or incomplete."""
     head, mark, appended = data.partition(b"<AppendedData")
     check_no_entities(head)
     if mark and not _END.search(data, max(0, len(data) - 1000)):
@@ -143,7 +143,7 @@ def _of_lz4(packed: bytes, wanted: int) -> bytes:
         return bytes(found[: vtkLZ4DataCompressor().Uncompress(packed, len(packed), found, len(found))])
 
 
-# Functions that unpack a block to a wanted length; they return at most one byte more, which shows that the block is too long.
+# Functions that unpack a block to a wanted length; if the block is too long, they return one byte more.
 _UNPACKING: dict[str, Callable[[bytes, int], bytes]] = {
     "vtkZLibDataCompressor": lambda packed, most: zlib.decompressobj().decompress(packed, most + 1),
     "vtkLZMADataCompressor": lambda packed, most: lzma.LZMADecompressor(memlimit=_MOST).decompress(packed, most + 1),
@@ -152,7 +152,7 @@ _UNPACKING: dict[str, Callable[[bytes, int], bytes]] = {
 
 
 def _numbers(text: str, dtype: np.dtype[Any]) -> Any:
-    """The numbers of a text; ValueError where a word is not a number."""
+    """The numbers of a text; ValueError if a word is not a number."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
         try:

@@ -11,7 +11,7 @@ from fem_reference.io.soup import Soup, of_meshio
 
 # The declared number of nodes or elements after the name of a section: as text, or as up to four binary numbers.
 _DECLARED = re.compile(rb"\$(Nodes|Elements)\r?\n([\d \t]+(?=[\r\n])|.{32}|.{4})", re.DOTALL)
-# The number of reads beyond the end of a file that meshio needs to find its end.
+# The number of reads beyond the end of a file that meshio needs to detect the end.
 _PAST_END = 2
 
 
@@ -45,13 +45,13 @@ def read_mesh(path: Path) -> Any:
 
 
 def _check_declared(data: bytes) -> None:
-    """ValueError where a section declares more nodes or elements, or blocks of them, than a file has bytes."""
+    """ValueError if a section declares more nodes or elements, or blocks of them, than a file has bytes."""
     header = data[:60].split()
     binary, old = header[2:3] == [b"1"], header[1:2] == [b"2.2"]
     for name, first in _DECLARED.findall(data):
         if binary and not old:
             numbers = [int.from_bytes(first[i : i + 8], "little") for i in (0, 8)]
-        else:  # in old files the number is text, even if the rest is binary
+        else:  # in old files this number is text, even if the rest is binary
             numbers = [int(word[:20]) for word in first.split()[: 1 if old else 2] if word.isdigit()]
         if max(numbers, default=0) > len(data):
             raise ValueError(f"{name.decode()} that are more than the file has bytes")

@@ -17,7 +17,7 @@ _CORNERS = ("vertex_indices", "vertex_index")
 
 
 def _read(path: Path) -> Soup:
-    """PLY, text or binary of either byte order; a list must be equally long in the whole element."""
+    """PLY, text or binary of either byte order; a list must have the same length in all rows of an element."""
     parts = re.match(rb"ply\s(.*?)end_header\r?\n(.*)", path.read_bytes(), re.DOTALL)
     if parts is None:
         raise ValueError("no PLY header")

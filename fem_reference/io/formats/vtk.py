@@ -74,21 +74,21 @@ def data_set(path: Path) -> DataSet:
 
 
 def save(path: Path, points: Floats, cells: Ints | Polylines, displacement: Floats) -> None:
-    """Write ``cells``, in VTU as an unstructured grid, with point data ``displacement`` (n, 3) [mm]; OSError where that fails."""
+    """Write ``cells``, in VTU as an unstructured grid, with point data ``displacement`` (n, 3) [mm]; OSError if that fails."""
     data, suffix = _data_set(DataBlock(points, cells)), path.suffix.lower()
     data.point_data.set_vectors(displacement, "displacement")
     _finish(_WRITERS[suffix], path, data.cast_to_unstructured_grid() if suffix == ".vtu" else data)
 
 
 def _finish(kind: str, path: Path, data: Any) -> None:
-    """Write ``data`` by VTK's writer of a ``kind``, without its messages; OSError where that fails."""
+    """Write ``data`` by VTK's writer of a ``kind``, without its messages; OSError if that fails."""
     import pyvista
 
     with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False):
         writer = getattr(pyvista, kind)(path, data)
         if path.suffix.lower() == ".vtk":
             writer.writer.SetFileTypeToBinary()
-        else:  # in the other modes of VTK a displacement that is not finite cannot be read back
+        else:  # in the other modes VTK cannot read back a displacement that is not finite
             writer.writer.SetDataModeToAppended()
         writer.write()
     if code := writer.writer.GetErrorCode():
@@ -97,7 +97,7 @@ def _finish(kind: str, path: Path, data: Any) -> None:
 
 
 def write_blocks(path: Path, blocks: Tree) -> None:
-    """VTM of ``blocks`` by name, with their files in a folder beside it, not atomically; OSError where that fails."""
+    """VTM of ``blocks`` by name, with their files in a folder beside it, not atomically; OSError if that fails."""
     _finish("XMLMultiBlockDataWriter", path, _collection(blocks))
 
 

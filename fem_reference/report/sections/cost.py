@@ -33,7 +33,7 @@ def facts(comparison: Comparison) -> dict[str, Any]:
 
 
 def _drawn(reference: Run) -> Drawing | None:
-    """The processor time of each frame as bars, None where it is not known."""
+    """The processor time of each frame as bars, None if it is not known."""
     seconds = reference.scalars.get("seconds_processor")
     if seconds is None:
         return None

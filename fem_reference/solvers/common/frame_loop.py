@@ -35,7 +35,7 @@ class FrameModel(Protocol):
         """Advance to the frame ``number``; the time of this call counts as solving."""
 
     def trouble(self) -> Trouble | None:
-        """The trouble with the present state; None where there is none."""
+        """The trouble with the present state; None if there is none."""
 
     def frame(self, number: int, /) -> Frame:
         """The present state, that of the frame ``number``."""
@@ -147,7 +147,7 @@ class MovingSurface:
         self.cost: dict[str, float] = {"unknowns": 3.0 * free}
 
     def trouble(self) -> Trouble | None:
-        """The trouble with the surface; None where there is none."""
+        """The trouble with the surface; None if there is none."""
         return self.check.trouble(self.points)
 
     def frame(self, number: int) -> Frame:

@@ -67,7 +67,7 @@ class Hill(Record):
 
     def static(self, path: float, activation: float) -> tuple[float, float]:
         """The force [N] and the fibre length [l0] in equilibrium at rest; of several equilibria that of the shortest fibre. A slack
-        tendon has no force. InputError where fibres would be shorter than a tenth of their optimal length.
+        tendon has no force. InputError if fibres would be shorter than a tenth of their optimal length.
         """
         low = max(_SHORTEST, 1.0001 * self.thickness)
         if self.tendon_force(path, low) == 0:
@@ -167,20 +167,12 @@ def _strain(force: float) -> float:
     return _TOE_STRAIN + (force - _TOE) / (1 - _TOE) * (_TENDON_STRAIN - _TOE_STRAIN)
 
 
-def hyperbola(velocity: float, curvature: float) -> float:
-    """The force, as a share of the isometric one, at a ``velocity`` of shortening as a share of the greatest: (5.1) solved for F.
-
-    Lengthening (negative) it rises to 1.4 by a hyperbola that is twice as steep at 0 (Thelen 2003).
-    """
-    if velocity >= 0:
-        return (1 - velocity) / (1 + velocity / curvature)
-    rise = _LENGTHENING - 1
-    slope = 2 * (1 + 1 / curvature)
-    return 1 + rise * slope * -velocity / (rise + slope * -velocity)
-
-
 def inverse_hyperbola(force: float, curvature: float) -> float:
-    """The velocity of shortening, as a share of the greatest, at a ``force``; tangents continue the hyperbola beyond its ends."""
+    """The velocity of shortening, as a share of the greatest, at a ``force``, a share of the isometric one: (5.1) solved for v.
+
+    In lengthening the force rises to 1.4 by a hyperbola that is twice as steep at 0 (Thelen 2003). Tangents continue both beyond
+    their ends.
+    """
     slope, rise = 2 * (1 + 1 / curvature), _LENGTHENING - 1
     if force < 0:  # shortening faster than without load
         return 1 - force * (1 + 1 / curvature)

@@ -62,7 +62,7 @@ class Guided:
     joint: Joint
 
     def passed(self, number: int) -> bool:
-        """True where lines pass the point at frame ``number``."""
+        """True if lines pass the point at frame ``number``."""
         low, high = (-np.inf, np.inf) if self.via.within is None else self.via.within
         return bool(low - _ROUNDING <= self.joint.angle_of(number) <= high + _ROUNDING)
 

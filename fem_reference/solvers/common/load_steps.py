@@ -25,7 +25,7 @@ class Attempt:
 
     @property
     def converged(self) -> bool:
-        """True where an equilibrium was found and no check refused it."""
+        """True if an equilibrium was found and no check refused it."""
         return self.status == "converged"
 
     def refused(self, why: Trouble) -> "Attempt":

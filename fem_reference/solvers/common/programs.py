@@ -57,7 +57,7 @@ def modules(folder: Path) -> set[Path]:
 def run(words: list[str], directory: Path, time_limit: float) -> Ended:
     """Run a program in a ``directory`` to its end, without a shell and without input; none of its processes outlives the call.
 
-    More than ``time_limit`` [s] of processor time ends it, and ``CLOCK`` times that by the clock. OSError where it does not start.
+    More than ``time_limit`` [s] of processor time ends it, and ``CLOCK`` times that by the clock. OSError if it does not start.
     """
     with TemporaryFile() as printed:
         begin = time.perf_counter()
@@ -124,7 +124,7 @@ class _Watch:
 
 
 def _last_line(printed: IO[bytes]) -> str:
-    """The last line that was printed; empty where there is none."""
+    """The last line that was printed; empty if there is none."""
     size = printed.seek(0, os.SEEK_END)
     printed.seek(max(0, size - _TAIL))
     lines = [line for line in printed.read().decode(errors="replace").splitlines() if line.strip()]

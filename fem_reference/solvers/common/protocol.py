@@ -65,7 +65,7 @@ class Solver[P, S: Record]:
         return self.settings
 
     def fills(self, settings: S) -> bool:  # noqa: ARG002
-        """True where it needs a meshed problem."""
+        """True if it needs a meshed problem."""
         return True
 
     def run(self, problem: P, settings: S) -> Run:
@@ -96,7 +96,7 @@ class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
         return self.moves
 
     def fills(self, settings: S) -> bool:
-        """True where it needs the muscle filled with tetrahedra and fibres."""
+        """True if it needs the muscle filled with tetrahedra and fibres."""
         return self.moves not in ("surface", "nothing") or self.fibres(settings)
 
 

@@ -29,7 +29,7 @@ class StateCheck(Protocol):
     """A check of states (n, 3) [mm], or of their unknowns (n,)."""
 
     def trouble(self, state: Floats, /) -> Trouble | None:
-        """The trouble with a ``state``, or with the step that led to it; None where there is none."""
+        """The trouble with a ``state``, or with the step that led to it; None if there is none."""
 
 
 def first_trouble(checks: Iterable[StateCheck], state: Floats) -> Trouble | None:

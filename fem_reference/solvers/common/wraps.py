@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Self
+from typing import Annotated
 
 import numpy as np
-from pydantic import BeforeValidator, model_validator
+from pydantic import BeforeValidator
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.records import Record, join, one_of
+from fem_reference.foundations.records import Record, join, one_of, rule
 from fem_reference.foundations.units import Point, PositiveLength, three
 from fem_reference.geometry import winding, wrapping
 from fem_reference.geometry.obstacles import Quadric, Ring
@@ -40,11 +40,7 @@ class Torus(Record):
     radius: PositiveLength
     tube: PositiveLength
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if not self.tube < self.radius:
-            raise ValueError('"tube" less than "radius", so that there is a hole')
-        return self
+    _check = rule(lambda one: one.tube < one.radius, '"tube" less than "radius", so that there is a hole')
 
 
 class ObstacleOn(Record):
@@ -98,7 +94,7 @@ class Wraps:
         return winding.around(moved, starts, ends)
 
     def inside(self, fixed: Floats, number: int) -> tuple[str, str]:
-        """The key of the obstacle with the deepest fixed point inside, its depth and line in words; empty where none is inside."""
+        """The key of the obstacle with the deepest fixed point inside, its depth and line in words; empty if none is inside."""
         found = []
         for i, surface in enumerate(self._moved(number)):
             points = fixed.reshape(-1, 3)

@@ -29,7 +29,7 @@ from fem_reference.problems.tendons import force_name
 from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.results import Results
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.runs.stress_statistics import stress_scalars
+from fem_reference.runs.stress_statistics import stress_scalars, volume_ratio
 from fem_reference.runs.views import force_between, frame_of
 from fem_reference.runs.writer import CutOff
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
@@ -123,7 +123,10 @@ def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
         own, note = dict[str, float](), ""
         for span in spans:
             others = tuple(name for name in names if name != span.name)
-            one = each[span.name](frame_of(frame, span, others), is_first=is_first)
+            part = frame_of(frame, span, others)
+            one = each[span.name](part, is_first=is_first)
+            assert part.state is not None  # of a muscle
+            own[f"{span.name}.volume_ratio"] = volume_ratio(problem.problems[span.name].mesh, part.state)
             new = {key: value for key, value in one.scalars.items() if key not in frame.scalars}
             for other in others:
                 new |= _on_other(frame, span.name, other)
@@ -144,7 +147,7 @@ def _on_other(frame: Frame, name: str, other: str) -> dict[str, float]:
 
 
 def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
-    """True where external loads act, and the shape alone gives them as the solver integrates them: they are quadratic in it, so the
+    """True if external loads act, and the shape alone gives them as the solver integrates them: they are quadratic in it, so the
     solver's quadrature has to be of degree 4 or above.
     """
     exact = settings.quadrature_degree is None or settings.quadrature_degree >= 4
@@ -207,7 +210,7 @@ def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> 
 def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
     """The distance between attached surface vertices and their targets on the bones, ``attachment_error_rms`` and
     ``attachment_error_max`` [mm]. It is not zero: exact attachments are facets of tets, which cover the vertices only roughly, and
-    springs yield. Empty where nothing is attached.
+    springs yield. Empty if nothing is attached.
     """
     surface = frame.surface
     if not problem.attached or surface is None:
@@ -259,7 +262,7 @@ def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
 
 
 def _has_steps(problem: AnyMuscle) -> bool:
-    """True where an effect depends on velocities."""
+    """True if an effect depends on velocities."""
     return any("interval" in effect.needs for effect in problem.body.effects)
 
 

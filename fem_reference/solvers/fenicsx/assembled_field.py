@@ -100,7 +100,7 @@ def _by_cell(msh: mesh.Mesh, values: Floats) -> fem.Function:
 
 
 def _assembled(left: Any, right: Any, space: Any, fixed: Floats) -> tuple[Any, Any]:
-    """Matrix and right-hand side; the equation of an unknown with a ``fixed`` (N,) value, NaN where free, sets it to that."""
+    """Matrix and right-hand side; the equation of an unknown with a ``fixed`` (N,) value, NaN if free, sets it to that."""
     values = fem.Function(space)
     values.x.array[:] = np.nan_to_num(fixed)
     conditions = [fem.dirichletbc(values, np.flatnonzero(~np.isnan(fixed)).astype(np.int32))]

@@ -247,7 +247,7 @@ class AssembledBody:
         return contact | moving | gap | own
 
     def examine(self, frame: float) -> float | None:
-        """The number of directions in which the energy falls from the present state, which is that of ``frame``; None where the
+        """The number of directions in which the energy falls from the present state, which is that of ``frame``; None if the
         tangent is not symmetric. The state is kept for later frames with the same loads.
 
         With drag or viscosity a direction counts if the departure along it would grow by more than a factor e over all frames, with

@@ -32,7 +32,7 @@ class PrescribedRegion:
         return np.ravel(np.reshape(self.wanted.x.array, (-1, 3))[self.nodes][:, self.along])
 
     def springs(self, form: Form) -> Any:
-        """The weak form of springs that pull towards the prescribed displacement, 0 where it is exact."""
+        """The weak form of springs that pull towards the prescribed displacement, 0 if it is exact."""
         if self.entry.stiffness is None:
             return 0
         measure = form.measure(str(self.entry.on))

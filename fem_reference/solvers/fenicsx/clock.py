@@ -32,7 +32,7 @@ class Clock:
 
     @property
     def matters(self) -> bool:
-        """True where an effect depends on the rate of motion."""
+        """True if an effect depends on the rate of motion."""
         return self.step is not None
 
     def start(self, frame: float, unknowns: Floats) -> None:
@@ -49,7 +49,7 @@ class Clock:
             self.step.velocity.x.array[:] = self.velocity
 
     def begins(self) -> bool:
-        """True where a body with inertia first moves in the next load step, before which its acceleration has to be found."""
+        """True if a body with inertia first moves in the next load step, before which its acceleration has to be found."""
         return self.resting and self.at >= self.first
 
     def instant(self, unknowns: Floats) -> None:

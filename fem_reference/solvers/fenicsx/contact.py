@@ -132,7 +132,7 @@ class ContactForces:
         return np.asarray(self.points.rest[some] + self.points.carried.shares[some] @ moved)
 
     def presses(self) -> bool:
-        """True where a bone presses a point, on any rank."""
+        """True if a bone presses a point, on any rank."""
         return bool(self.comm.allreduce(any(len(one.pressed) for one in self.now), MPI.LOR))
 
     def tractions(self) -> Tractions:
@@ -271,12 +271,12 @@ class ContactForces:
         return mine
 
     def _worst(self, mine: list[tuple[float, str]]) -> str | None:
-        """The sentence with the greatest number among those of all ranks; None where there is none."""
+        """The sentence with the greatest number among those of all ranks; None if there is none."""
         found: list[tuple[float, str]] = [one for rank in self.comm.allgather(mine) for one in rank]
         return max(found)[1] if found else None
 
     def _through(self, i: int) -> tuple[float, str] | None:
-        """The point that went farthest through a bone since the last settled state; None where none did. Such a point's straight
+        """The point that went farthest through a bone since the last settled state; None if none did. Such a point's straight
         path in the frame of the bone is deeper inside than both of its ends and leaves on the other side.
         """
         _, settled_at, settled = self.settled

@@ -75,7 +75,7 @@ class Determinants:
         return self._at("quadrature point").ravel()
 
     def everywhere(self, good: NDArray[np.bool_]) -> bool:
-        """True where all points (p,) of all ranks are ``good``."""
+        """True if all points (p,) of all ranks are ``good``."""
         return bool(self.mesh.comm.allreduce(bool(good.all()), MPI.LAND))
 
     def _at(self, where: str) -> Floats:

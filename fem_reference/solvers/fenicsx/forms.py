@@ -49,7 +49,7 @@ class Form:
     are none; ``stretched``: the same for effects that store energy on the surface.
 
     ``energy``: the stored energy as an integral; ``determinant``: det F; ``fibre_stretch``: as the energies use it (None without
-    fibres). The user sets the amounts of effects (``set_amounts``) and the time ``step`` (None where nothing depends on it).
+    fibres). The user sets the amounts of effects (``set_amounts``) and the time ``step`` (None if nothing depends on it).
     ``kinetic``: the kinetic energy (0 without inertia); ``rule``: points (q, 3) and weights (q,) of the quadrature, of ``degree``;
     ``regions``: this rank's facets by name; ``rest``: the stress at rest of a body in situ.
     """

@@ -20,7 +20,7 @@ _SHARE = 1e-2  # the remaining residual, as a share of the tolerance of Newton's
 
 def balance(form: Form, system: System, linear: LinearSolver, residual: float) -> None:
     """Find the stress at rest of a ``form``, if it has one, up to a small share of the tolerated ``residual`` of Newton's method.
-    ArithmeticError where none is found.
+    ArithmeticError if none is found.
     """
     if form.rest is None:
         return

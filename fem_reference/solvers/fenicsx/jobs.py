@@ -53,7 +53,7 @@ def _is_of(whole: Kept, number: int) -> bool:
 class Job:
     """A ``body`` and how to solve it. ``samples``: by name, the cell (n,) of each point and the rest points (n, 3) whose positions
     are requested. Only a muscle has them; forces at edges that attachments share are then divided between these. ``kept``: the
-    states that are kept, if any. InputError where stable states are to be followed with friction, as stability under friction is
+    states that are kept, if any. InputError if stable states are to be followed with friction, as stability under friction is
     not known.
     """
 

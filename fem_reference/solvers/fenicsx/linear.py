@@ -37,7 +37,7 @@ def fgmres(matrix: PETSc.Mat, most: int) -> PETSc.KSP:
 
 
 def iterate(krylov: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, most: int, spent: Spent) -> bool:
-    """Solve for ``x`` in at most ``most`` iterations; True where the residual falls to ``tolerance`` times the norm of ``b``."""
+    """Solve for ``x`` in at most ``most`` iterations; True if the residual falls to ``tolerance`` times the norm of ``b``."""
     with spent.on("krylov"):
         krylov.setTolerances(rtol=tolerance, atol=0.0, max_it=most)
         krylov.solve(b, x)
@@ -77,11 +77,11 @@ class Factorised:
 
     @property
     def fresh(self) -> bool:
-        """True where the factors are those of the present matrix."""
+        """True if the factors are those of the present matrix."""
         return self.factorised == self.matrix.stateGet()
 
     def solve_exactly(self) -> bool:
-        """Factorise each matrix from now on, in double precision; True where that is a change."""
+        """Factorise each matrix from now on, in double precision; True if that is a change."""
         if not self.lagged:
             return False
         self.lagged, self.factorised = False, None
@@ -142,7 +142,7 @@ class Factorised:
         return int(self.factors.getMumpsInfog(_NEGATIVE))
 
     def _resolved(self) -> bool:
-        """True where the factorisation M matches the matrix A in the softest directions too: for a vector v, turned towards them by
+        """True if the factorisation M matches the matrix A in the softest directions too: for a vector v, turned towards them by
         inverse iteration, M^-1 A v equals v up to a tenth. So along none of them can M and A differ in sign.
         """
         random = np.random.default_rng(self.matrix.comm.rank)

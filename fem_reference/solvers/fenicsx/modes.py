@@ -61,7 +61,7 @@ def _displacements(body: AssembledBody, mode: PETSc.Vec) -> Floats:
 
 def leave(body: AssembledBody, frame: float, share: float) -> float | None:
     """Perturb the present state, that of ``frame``, by a ``share`` of the body's size along its lowest mode, and solve again until
-    there are fewer negative modes. Returns the perturbation [mm], None where the state is stable or no other was found. Collective.
+    there are fewer negative modes. Returns the perturbation [mm], None if the state is stable or no other was found. Collective.
     """
     if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
         return None
@@ -124,7 +124,7 @@ class LimitPoint:
 
 
 def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
-    """The limit point that follows the last good state within a few load steps of the smallest size ``step``; None where there is
+    """The limit point that follows the last good state within a few load steps of the smallest size ``step``; None if there is
     none or it cannot be known. Collective.
 
     Before a limit point the least eigenvalue of the tangent falls as the square root of the remaining path. So its square is

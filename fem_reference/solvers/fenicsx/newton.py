@@ -81,7 +81,7 @@ class Newton:
         return Attempt("converged", len(residuals) - 1, tuple(residuals))
 
     def _hopeless(self, residuals: list[float]) -> str | None:
-        """The reason to stop iterating after ``residuals``, None where there is none."""
+        """The reason to stop iterating after ``residuals``, None if there is none."""
         iterations = len(residuals) - 1
         if not np.isfinite(residuals[-1]):
             return f"reached a state where a law, or a prescribed path, has no value in {iterations} iterations"

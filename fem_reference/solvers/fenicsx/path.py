@@ -150,7 +150,7 @@ class Known:
         del self.states[: max(0, len(self.states) - max(1, int(_MOST / size)))]
 
     def find(self, acting: Floats) -> KnownState | None:
-        """The state under ``acting``, None where there is none."""
+        """The state under ``acting``, None if there is none."""
         same = np.array([np.abs(one.acting - acting).max(initial=0.0) <= _SAME for one in self.states], bool)
         self.comm.Allreduce(MPI.IN_PLACE, same, MPI.LAND)
         return self.states[int(np.argmax(same))] if same.any() else None

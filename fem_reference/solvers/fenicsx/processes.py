@@ -38,7 +38,7 @@ MARK = "@fem_reference "  # begins each line of output that names the file of a 
 
 
 def installed() -> bool:
-    """True where FEniCSx is installed."""
+    """True if FEniCSx is installed."""
     return any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx"))
 
 
@@ -50,7 +50,7 @@ def require_installed() -> None:
 
 
 def mpiexec() -> str | None:
-    """The wheel's own ``mpiexec`` beside the interpreter, else one on the PATH, maybe of another MPI; None where there is none."""
+    """The wheel's own ``mpiexec`` beside the interpreter, else one on the PATH, maybe of another MPI; None if there is none."""
     beside = Path(sys.executable).with_name("mpiexec")
     return str(beside) if beside.exists() else shutil.which("mpiexec")
 

@@ -69,7 +69,7 @@ def available() -> float:
 
 def planned[S: BodySettings](settings: S, cells: Cells, free: float) -> S:
     """The settings with a linear solver and its precision: the requested ones, or those that the size suggests and that fit into
-    the ``free`` megabytes. InputError where none fits.
+    the ``free`` megabytes. InputError if none fits.
     """
     count = unknowns(cells, settings.element)
     for kind in [settings.linear_solver] if settings.linear_solver else _fitting(settings.element, count):

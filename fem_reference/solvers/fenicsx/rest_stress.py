@@ -34,5 +34,5 @@ class RestStress:
 
 
 def rest_stress(unknowns: fem.Function, effects: tuple[Effect, ...]) -> RestStress | None:
-    """The stress at rest of a body with ``effects``, None where it is not in situ."""
+    """The stress at rest of a body with ``effects``, None if it is not in situ."""
     return None if among(effects) is None else RestStress(unknowns, effects)

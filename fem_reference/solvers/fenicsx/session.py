@@ -37,7 +37,7 @@ class Session:
         return replace(collected(frames, outcome), solver="fenicsx", body=body, settings=settings)
 
     def follow(self, body: Body, settings: BodySettings, sink: Sink) -> Outcome:
-        """Pass the frames of ``body`` to ``sink``; InputError where the element does not suit it."""
+        """Pass the frames of ``body`` to ``sink``; InputError if the element does not suit it."""
         check(body, settings.element, settings.quadrature_degree)
         if body.touching and self.ranks > 1:
             raise InputError("ranks", self.ranks, "1, as only then parts of the surface may touch")
@@ -119,7 +119,7 @@ def solve_body(body: Body, settings: BodySettings) -> Run:
 
 
 def solve_scalar(problem: FieldProblem, settings: FieldSettings, sink: Sink) -> Outcome:
-    """Solve for a scalar field and pass it to ``sink``, by the shared session or by a new one; NaN where the process died."""
+    """Solve for a scalar field and pass it to ``sink``, by the shared session or by a new one; NaN if the process died."""
     frames: list[Frame] = []
     with opened() as solver:
         outcome = solver.run(problem, settings.time_limit, frames.append)

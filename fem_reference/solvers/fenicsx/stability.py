@@ -30,7 +30,7 @@ class Stability:
         return found
 
     def negative_modes(self, *, pointwise: bool = False) -> float:
-        """The number of directions in which the energy falls from the present state; NaN where the tangent is singular.
+        """The number of directions in which the energy falls from the present state; NaN if the tangent is singular.
         ``pointwise``: see ``cells``.
         """
         self.system.linearise(pointwise=pointwise)

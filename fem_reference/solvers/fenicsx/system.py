@@ -154,14 +154,14 @@ class System:
             self.tangent.unit = self.scale[pressures] = float(np.sqrt(stiff / coupling))
 
     def missing(self) -> Floats:
-        """The unknowns minus their prescribed values (n,); 0 where nothing is prescribed."""
+        """The unknowns minus their prescribed values (n,); 0 if nothing is prescribed."""
         found = np.zeros(self.size)
         for one in self.conditions:
             found[one.exact] = self.unknowns.x.array[one.exact] - one.prescribed[: len(one.exact)]
         return found
 
     def lacking(self) -> bool:
-        """True where an unknown on any rank differs from its prescribed value by more than rounding."""
+        """True if an unknown on any rank differs from its prescribed value by more than rounding."""
         most = np.abs(self.missing()).max(initial=0.0)
         return bool(self.unknowns.function_space.mesh.comm.allreduce(most, MPI.MAX) > _ROUNDING)
 

@@ -55,9 +55,7 @@ class Worker:
         self.restart = Restart(self.body, job.kept) if job.kept else None
 
     def begin(self) -> tuple[tuple[float, ...], StepSizes]:
-        """The frames to march through and the load steps: from rest, or from the frame at which an earlier process was cut
-        off.
-        """
+        """The frames to march through and the load steps: from rest, or from the frame at which an earlier process was cut off."""
         frames, settings = self.job.body.frames, self.settings
         first, good = settings.first_step, self.restart.good() if self.restart else ()
         if not self.restart or not good:
@@ -128,7 +126,7 @@ class Worker:
         return {} if modes is None or own is None else {"negative_modes": modes, "material_modes": own}
 
     def instability(self) -> str:
-        """The note on unstable states; empty where there are none."""
+        """The note on unstable states; empty if there are none."""
         if not self.unstable:
             return ""
         most, own = (max(modes) for modes in zip(*self.unstable.values(), strict=True))

@@ -47,7 +47,7 @@ class ScikitBodySettings(Record):
 
 
 def _check_known(body: Body) -> None:
-    """Raise InputError where a body has a part that this solver does not support."""
+    """Raise InputError if a body has a part that this solver does not support."""
     if body.contact is not None or body.touching:
         name, got = ("touching", "parts that touch") if body.touching else ("contact", "bones")
         raise InputError(name, got, "a body without it, as this solver has no contact")
@@ -99,7 +99,7 @@ class _Tangent:
     matrix: Any
 
     def step(self, free: Ints, fixed: Ints, gap: Floats) -> Floats:
-        """The Newton step in which the ``fixed`` unknowns change by ``gap``; RuntimeError where it is not unique."""
+        """The Newton step in which the ``fixed`` unknowns change by ``gap``; RuntimeError if it is not unique."""
         step = np.zeros_like(self.unknowns)
         step[fixed] = gap
         rows = self.matrix[free]

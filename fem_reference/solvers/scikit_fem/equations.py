@@ -70,7 +70,7 @@ class Equations:
         return residual, matrix
 
     def smallest_determinants(self, unknowns: Floats) -> tuple[float, float]:
-        """The smallest det F at quadrature points and at the vertices of the cells; NaN where one is not a number."""
+        """The smallest det F at quadrature points and at the vertices of the cells; NaN if one is not a number."""
         inside, vertices = (_determinant(points, unknowns).min() for points in (self.inside, self.space.vertices))
         return float(inside), float(vertices)
 

@@ -108,7 +108,7 @@ class Space:
         return self._points(skfem.Basis, (corners, np.ones(corners.shape[1])))
 
     def facets(self, region: str) -> Ints:
-        """The facets of scikit-fem's mesh in ``region``; InputError where one of them does not belong to exactly one cell."""
+        """The facets of scikit-fem's mesh in ``region``; InputError if one of them does not belong to exactly one cell."""
         wanted = np.unique(np.sort(self.cells.facets[region], axis=1), axis=0)
         found = []
         for side, facets in zip(self.nodal.refdom.facets, self.mesh.t2f, strict=True):

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from fem_reference import solvers
 from fem_reference.assessment import health
@@ -13,7 +13,7 @@ from fem_reference.assessment.stress import Bound
 from fem_reference.effects import Effect
 from fem_reference.effects.touching import among as touching_among
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.records import FileName, Name, Record, join, keys, one_of, parse
+from fem_reference.foundations.records import FileName, Name, Record, join, key_rule, keys, one_of, parse, rule
 from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
 from fem_reference.io import texts
 from fem_reference.problems.problem import Task
@@ -54,15 +54,9 @@ class Lattice(Record):
     fibre: tuple[float, float, float] = (0.0, 0.0, 1.0)
     points_apart: PositiveLength | None = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if not min(self.size) > 0 or min(self.cells) < 1 or min(self.grading) <= 0:
-            raise ValueError("size, cells and grading above 0")
-        if math.prod(self.cells) > _MOST_CELLS:
-            raise ValueError(f"at most {_MOST_CELLS} cells")
-        if not any(self.fibre):
-            raise ValueError("a fibre that has a direction")
-        return self
+    _check_sizes = rule(lambda one: min(*one.size, *one.cells, *one.grading) > 0, "size, cells and grading above 0")
+    _check_cells = rule(lambda one: math.prod(one.cells) <= _MOST_CELLS, f"at most {_MOST_CELLS} cells")
+    _check_fibre = rule(lambda one: any(one.fibre), "a fibre that has a direction")
 
 
 class Hold(Record):
@@ -149,44 +143,36 @@ class Hard(Record):
         strange = [bound.quantity for bound in bounds if bound.quantity not in health.QUANTITIES]
         if strange:
             raise ValueError(f"quantities among {', '.join(health.QUANTITIES)}; {strange[0]} is none of them")
-        if all(bound.quantity == "from_reference" for bound in bounds):
-            raise ValueError("another quantity beside from_reference, which a run without a reference lacks")
         return bounds
 
-    @field_validator("beside")
-    @classmethod
-    def _check_beside(cls, others: tuple[OtherBody, ...]) -> tuple[OtherBody, ...]:
-        if any(touching_among(one.effect) for one in others):
-            raise ValueError('"touching" among the effects of the first block, as it acts between all')
-        return others
-
-    @field_validator("hold")
-    @classmethod
-    def _check_faces(cls, holds: tuple[Hold, ...]) -> tuple[Hold, ...]:
-        if len({hold.face for hold in holds}) < len(holds):
-            raise ValueError("every face once")
-        return holds
-
-    @field_validator("bone")
-    @classmethod
-    def _check_forms(cls, bones: tuple[CaseBone, ...]) -> tuple[CaseBone, ...]:
-        if any(bone.surface for bone in bones):
-            raise ValueError("bones of closed forms, and not of files")
-        return bones
-
+    _check_bounds = key_rule(
+        "bound",
+        lambda bounds, _: any(bound.quantity != "from_reference" for bound in bounds),
+        "another quantity beside from_reference, which a run without a reference lacks",
+    )
+    _check_touching = key_rule(
+        "beside",
+        lambda others, _: not any(touching_among(one.effect) for one in others),
+        '"touching" among the effects of the first block, as it acts between all',
+    )
+    _check_faces = key_rule(
+        "hold", lambda holds, _: len({hold.face for hold in holds}) == len(holds), "every face once"
+    )
+    _check_forms = key_rule(
+        "bone", lambda bones, _: not any(bone.surface for bone in bones), "bones of closed forms, and not of files"
+    )
     _check_form = one_of("block", "shipped")
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if (self.block is None) != (self.frames is None):
-            raise ValueError('"frames" beside "block" and only there')
-        if self.beside and (self.block is None or self.start is not None or FIRST in (one.name for one in self.beside)):
-            raise ValueError(
-                f'"beside" with a "block", without a "start", and no body named "{FIRST}", as the first is'
-            )
-        if bool(self.only) != bool(self.because):
-            raise ValueError('"because" beside "only" and only there')
-        return self
+    _check_frames = rule(
+        lambda one: (one.block is None) == (one.frames is None), '"frames" beside "block" and only there'
+    )
+    _check_beside = rule(
+        lambda one: (
+            not one.beside
+            or (one.block is not None and one.start is None and FIRST not in (other.name for other in one.beside))
+        ),
+        f'"beside" with a "block", without a "start", and no body named "{FIRST}", as the first is',
+    )
+    _check_because = rule(lambda one: bool(one.only) == bool(one.because), '"because" beside "only" and only there')
 
     def choice(self, defaults: SolverChoice) -> SolverChoice:
         """The solver of ``defaults`` with the settings that this case changes."""
@@ -246,10 +232,10 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
     for key in whose:
         if key in table:
             raise InputError(join(where, key), "an unknown key", f"one of {', '.join(keys(Hard))}")
-    if "effect" in table:
-        table = table | {"effect": casefile.effects(table["effect"], where)}
+    table = casefile.with_effects(table, where)
     if isinstance(several := table.get("beside"), list):
-        table = table | {"beside": [_with_effects(one, join(where, f"beside[{i}]")) for i, one in enumerate(several)]}
+        others = [casefile.with_effects(one, join(where, f"beside[{i}]")) for i, one in enumerate(several)]
+        table = table | {"beside": others}
     hard = parse(Hard, table | whose, where)
     if hard.contrast and hard.no_solution:
         want = 'nothing beside "no_solution", as no run should reach its end'
@@ -269,13 +255,6 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
         want = f"a frame after {timed.numbers[0]}, up to {timed.numbers[-1]}"
         raise InputError(join(where, "steps.until"), hard.steps.until, want)
     return hard
-
-
-def _with_effects(one: Any, where: str) -> Any:
-    """A body ``beside`` the block, with the effects that its table names."""
-    return (
-        one | {"effect": casefile.effects(one["effect"], where)} if isinstance(one, dict) and "effect" in one else one
-    )
 
 
 def _check_solvers(hard: Hard, task: Task) -> None:

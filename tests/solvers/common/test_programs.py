@@ -12,6 +12,7 @@ def run(text: str, tmp_path, limit: float = 60.0) -> programs.Ended:
     return programs.run([sys.executable, "-c", text], tmp_path, limit)
 
 
+@pytest.mark.slow
 def test_time_is_by_the_clock_and_of_the_processor_with_its_own_processes(tmp_path) -> None:
     """A second of waiting is no work; half a second of work of a process that it waits for is."""
     work = "import time; b = time.process_time()\nwhile time.process_time() - b < 0.5: pass"
@@ -23,6 +24,7 @@ def test_time_is_by_the_clock_and_of_the_processor_with_its_own_processes(tmp_pa
     assert ended.limit is None
 
 
+@pytest.mark.slow
 def test_work_of_its_ended_processes_counts_for_the_limit(tmp_path) -> None:
     """One after the other, each far below it."""
     work = "import time; b = time.process_time()\nwhile time.process_time() - b < 0.1: pass"

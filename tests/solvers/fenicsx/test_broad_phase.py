@@ -70,6 +70,7 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["exact", "grid"])
 def test_what_comes_and_goes_is_felt_as_if_every_point_were_asked(kind) -> None:
     ball = balls()[kind]
@@ -85,6 +86,7 @@ def test_what_comes_and_goes_is_felt_as_if_every_point_were_asked(kind) -> None:
     assert all(0 < one[2] < 0.2 * points for one in quick[20:24])  # those that it lies on
 
 
+@pytest.mark.slow
 def test_what_stays_out_of_reach_is_not_looked_at(monkeypatch) -> None:
     """After the first look; and nothing is summed."""
     far = Slide((0, 0, 0), (0, 0, 30))

@@ -102,6 +102,7 @@ def test_forces_balance_slide_at_the_friction_times_the_normal_force_and_lose_wo
     assert works[0] == 0 < works[1] < works[2]
 
 
+@pytest.mark.slow
 def test_friction_begins_where_an_overlap_at_rest_is_removed(fem_lab) -> None:
     # 5 um are removed from frame -1 to 0 below a plate that slides by 0.5 mm in each frame.
     plate = ContactBone("plate", HalfSpace((0.0, 0.0, 0.995), (0.0, 0.0, -1.0)), Slide((0.5, 0.0, 0.0)))
@@ -117,6 +118,7 @@ def test_friction_begins_where_an_overlap_at_rest_is_removed(fem_lab) -> None:
     assert 0 < rough[2].scalars["friction_work"] < along * 1.0
 
 
+@pytest.mark.slow
 def test_a_bone_from_beyond_its_known_distances_drags_as_much(fem_lab) -> None:
     # Its distance is known within 1 mm. It comes from 3 mm above and slides 1 mm at once; in one step its whole path would count
     # as if it had been on the way for 1e6 mm.

@@ -10,6 +10,7 @@ from fem_reference import effects
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Polylines, TetMesh
 from fem_reference.foundations.motion import RigidMotion, apply
+from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import Settings, processes
@@ -185,3 +186,20 @@ def test_a_tendon_pulls_at_the_bone_that_it_goes_to() -> None:
     assert last["force_top_tendon"] > 0.05
     for axis in "xyz":
         assert sum(last[f"force_on_{one.bone.name}_{axis}"] for one in problem.attached) == pytest.approx(0, abs=1e-6)
+
+
+def test_volumes_of_several_muscles_add_up_to_that_of_all() -> None:
+    """Two bars, one bent: the solver's own integral over both is the mean of theirs, weighted by volume."""
+    soft = (MUSCLE[0], effects.find("incompressible").model_validate({"bulk": "20 kPa"}))
+    still, bent = turning(0.0), turning(0.8, axis=(0, 1, 0), centre=(0.0, 0.0, 0.0))
+    bars = {
+        name: shapes.bar((1, 1, 2), size, {"bottom": still, "top": motion}, soft, (0, 10))
+        for name, size, motion in (("a", (10, 10, 20), still), ("b", (8, 8, 30), bent))
+    }
+    outcome, frames = solved(MusclesProblem(bars, (), None, apart=False), ranks=1)
+    assert outcome.status == "converged"
+    found = frames[-1].scalars
+    assert found["a.volume_ratio"] == pytest.approx(1, abs=1e-12)
+    assert abs(found["b.volume_ratio"] - 1) > 0.01
+    mean = (2000 * found["a.volume_ratio"] + 1920 * found["b.volume_ratio"]) / 3920
+    assert found["volume_ratio"] == pytest.approx(mean, rel=1e-12)

@@ -93,6 +93,7 @@ def test_two_parts_as_one_that_touches_itself_have_the_same_forces(element) -> N
     assert others == pytest.approx(facts)
 
 
+@pytest.mark.slow
 def test_at_rest_no_body_feels_itself_however_thin_it_becomes() -> None:
     # A sheet and a block, each squeezed to a tenth in ten steps and sheared so that its sides overhang by 80 degrees; and the
     # letter, whose slit is wider than the smoothing.

@@ -88,6 +88,7 @@ def test_a_uniaxial_stretch_is_that_of_the_scalar_equation(element) -> None:
     assert solution.states[0].points == pytest.approx(given.mesh.points, abs=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("element", "degree"), [("P1", 1), ("P1/P1", 1), ("P2", 2), ("P2/P1", 1), ("Q1/P0", 1), ("Q2/Q1", 2)]
 )
@@ -101,6 +102,7 @@ def test_patch_test_on_crooked_cells(element, degree) -> None:
     assert state.scalars["volume_ratio"] == pytest.approx(np.linalg.det(np.eye(3) + gradient), abs=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("element", ["P2/P1", "Q1/P0"])
 def test_rotating_costs_nothing_and_reactions_balance(element) -> None:
 
@@ -138,6 +140,7 @@ def test_the_ground_carries_the_weight(element) -> None:
     assert states[2].points[:, 2].max() < 4.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("element", "degree"), [("P2/P1", 1), ("Q1/P0", 1), ("P2", 2), ("Q2/Q1", 2)])
 def test_a_fluid_all_around_compresses_by_its_pressure_over_the_bulk_modulus(element, degree) -> None:
     pressure = [effect("pressure", ramp=RAMP, on=face, pressure="2 MPa") for face in FACES]

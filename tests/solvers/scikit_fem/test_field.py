@@ -142,6 +142,7 @@ def on_sphere(folder, subdivisions: int, order: int, effect: list):
 DIFFUSION, REACTION = {"name": "diffusion", "coefficient": 1.0}, {"name": "reaction", "rate": 1.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 2])
 def test_poisson_on_the_sphere_is_of_order_two(tmp_path, order) -> None:
     # -lap u + u = 7 u for the harmonic u = xy of degree 2. On flat triangles no element is of a higher order than 2.
@@ -154,6 +155,7 @@ def test_poisson_on_the_sphere_is_of_order_two(tmp_path, order) -> None:
     assert np.log2(errors[-2] / errors[-1]) == pytest.approx(2, abs=0.1)
 
 
+@pytest.mark.slow
 def test_eigenvalues_on_the_sphere_are_of_order_two(tmp_path) -> None:
     # l (l + 1), each 2 l + 1 times: 0, 2 (3 times), 6 (5 times).
     errors = []

@@ -9,6 +9,7 @@ from fem_reference.solvers.scikit_fem.spaces import Space
 from tests.solvers.scikit_fem.test_body import FACES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("element", "degree"), [("P2", 2), ("Q2", 2), ("Q1", 1), ("P1", 1)])
 def test_normals_and_weights_satisfy_the_divergence_theorem(element, degree) -> None:
     def bent(unit):

@@ -10,6 +10,7 @@ from fem_reference.studies.hard import blocks, records, running
 CASES = {hard.name: hard for hard in records.read_all()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hard", [hard for hard in CASES.values() if hard.block], ids=lambda hard: hard.name)
 def test_blocks_are_whole(hard) -> None:
     problem = blocks.problem(hard)

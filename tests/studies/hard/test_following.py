@@ -17,6 +17,7 @@ from fem_reference.studies.hard.following import StalledError, follow
 CASES = {hard.name: hard for hard in records.read_all()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["pbd", "scikit_fem"])
 def test_at_rest_a_surface_stays_where_it_is(solver: str) -> None:
     problem = blocks.problem(CASES["at_rest.millimetres"])

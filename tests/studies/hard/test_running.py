@@ -23,6 +23,7 @@ def cell(name: str, solver: str, **settings: object) -> Cell:
     return running.cell(running.Posed(CASES[name]), SolverChoice(**{"solver": solver, **choice.settings, **settings}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", FAST)
 def test_at_rest_stays_at_rest(solver) -> None:
     found = cell("at_rest.millimetres", solver)
@@ -75,6 +76,7 @@ def test_bodies_in_each_other_are_no_success_and_contact_keeps_them_apart() -> N
     assert "block and narrow in each other: 0.6 mm in frame 4" in within.sentence
 
 
+@pytest.mark.slow
 def test_what_explodes_with_finite_numbers_is_found_out() -> None:
     """Negative controls: a time step far beyond the stable one, and one time step for each frame."""
     exploded = cell("twist.one_radian_at_once", "mass_spring", time_step="20 ms")
@@ -84,6 +86,7 @@ def test_what_explodes_with_finite_numbers_is_found_out() -> None:
     assert (folded.verdict, folded.quantity, folded.status) == ("degraded", "inside_out", "converged")
 
 
+@pytest.mark.slow
 def test_a_bone_that_passes_between_frames_is_found_out() -> None:
     found = cell("bones.crosses_in_a_frame", "pbd")
     assert (found.verdict, found.quantity) == ("degraded", "passed")

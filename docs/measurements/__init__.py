@@ -1,0 +1,10 @@
+"""Tables of the documentation: what is kept of each measurement, and the rows that a page shows of it."""
+
+from measurements import cases, evidence, fibres, hard, solvers
+from measurements.tables import KEPT, Measurement, kept, origin
+
+__all__ = ["KEPT", "MEASUREMENTS", "TABLES", "Measurement", "kept", "origin"]
+
+_SUBJECTS = (evidence, cases, fibres, hard, solvers)
+MEASUREMENTS = {name: one for subject in _SUBJECTS for name, one in subject.MEASUREMENTS.items()}
+TABLES = {name: one for subject in _SUBJECTS for name, one in subject.TABLES.items()}

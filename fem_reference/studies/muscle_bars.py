@@ -1,0 +1,74 @@
+"""Error bars of several muscles that are solved together: in each further solution the cause of error is smaller in all muscles."""
+
+import logging
+from typing import cast
+
+from fem_reference.assessment.error_bars import ErrorBars, Pair
+from fem_reference.problems.joining import called
+from fem_reference.problems.muscles import MusclesProblem
+from fem_reference.runs.store import Run
+from fem_reference.scenes.case import Case
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.muscles import MusclesCase, muscles_of, with_muscles
+from fem_reference.solvers import fenicsx
+from fem_reference.studies import refinement
+from fem_reference.studies.execution import Bench
+from fem_reference.studies.variations import by_springs, on_larger
+
+log = logging.getLogger(__name__)
+
+_LARGER = "larger tetrahedra"
+
+
+def coarser(case: MusclesCase) -> tuple[MusclesCase, float]:
+    """The case with larger tetrahedra in every muscle, and their size over that of its own: the same ratio for all, as errors of
+    one muscle reach its neighbours. Where all are refined, the last refinement is left out.
+    """
+    if all(one.refinements for one in muscles_of(case)):
+        return with_muscles(case, lambda one: {"refinements": one.refinements - 1}), 2.0
+    return on_larger(case, refinement.RATIO), refinement.RATIO
+
+
+def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> dict[str, ErrorBars]:
+    """The error bars of each muscle by name, from runs of all in the store or solved now; they are stored beside the ``reference``.
+    With ``model``, also the change by exact attachments. Empty for a run that did not converge.
+    """
+    if reference.outcome.status != "converged":
+        log.info("error bar: none, of a reference that did not converge")
+        return {}
+    own, parts = cast("Bench[MusclesCase]", bench), bench.parts
+    base, ratio = coarser(own.scene)
+    springs = {name: by_springs(part.scene) for name, part in parts.items()}
+    with fenicsx.shared():
+        found = refinement.solutions(own, reference, {_LARGER: base}, ratio, model=model and any(springs.values()))
+    split = {name: other.by_muscle(run) for name, (other, run) in found.items()}
+    fine, coarse, exact = own.by_muscle(reference), split.pop(_LARGER), split.pop(refinement.EXACT, {})
+    bars = dict[str, ErrorBars]()
+    for name, part in parts.items():
+        refinement.check_coarser(part, *(refinement.tets(one[name], called(name, "tets")) for one in (fine, coarse)))
+        size = part.scene.muscle.tet_size / 2**part.scene.muscle.refinements
+        varied = {cause: runs[name] for cause, runs in split.items()}
+        safety = _safety(own, parts, name)
+        pair = Pair(fine[name], coarse[name], (size, ratio * size), varied, exact.get(name), safety, springs[name])
+        bars[name] = refinement.made(pair, part, reference.folder and reference.folder / name, reference)
+    return bars
+
+
+def _safety(bench: Bench[MusclesCase], parts: dict[str, Bench[MuscleCase]], name: str) -> float:
+    """The factor of safety of a muscle: the greatest of its own and of those that it may touch, whose errors reach it."""
+    problem = bench.problem()
+    assert isinstance(problem, MusclesProblem)
+    near = {name}.union(*(pair for pair in problem.pairs if name in pair))
+    return max(refinement.safety(parts[one]) for one in near)
+
+
+def bars(bench: Bench[Case], reference: Run, name: str) -> ErrorBars | None:
+    """The error bars of the muscle of a ``name``: stored ones, else those that :func:`obtain` makes of all."""
+    return (stored(bench, reference) or obtain(bench, reference)).get(name)
+
+
+def stored(bench: Bench[Case], reference: Run) -> dict[str, ErrorBars]:
+    """The error bars of each muscle that are stored beside a reference; empty where those of any are missing."""
+    found = {name: refinement.stored(reference, name) for name in bench.parts}
+    known = {name: one for name, one in found.items() if one is not None}
+    return known if len(known) == len(found) else {}

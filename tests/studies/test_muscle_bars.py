@@ -1,0 +1,146 @@
+"""Error bars of several muscles by a stand-in for the solver: each has an error of its own and a share of its neighbour's."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small
+import stand_ins
+
+from fem_reference import cli, error_bars, metrics, report, solve
+from fem_reference.assessment import neighbours
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import vertex_areas
+from fem_reference.io import files
+from fem_reference.report import pages
+from fem_reference.runs.store import Frame, Outcome
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscles import exactly_attached
+from fem_reference.solvers import fenicsx
+from fem_reference.studies import muscle_bars, refinement
+from fem_reference.studies.execution import Bench
+
+pytestmark = pytest.mark.slow
+
+OWN = """
+[[muscle]]
+name = "{0}"
+surface = "{0}.vtp"
+unit = "mm"
+tet_size = "{1} mm"
+fibres.traced = {{ count = 4, start = "origin", end = "insertion" }}
+[[muscle.attachment]]
+name = "origin"
+bone = "floor"
+within = "1.5 mm"
+[[muscle.attachment]]
+name = "insertion"
+bone = "lid"
+within = "1.5 mm"
+"""
+TOUCHING = '\n[[effect]]\nname = "touching"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
+SIZES, AREAS = {"wide": 6.0, "thin": 5.0}, {"wide": 100.0, "thin": 36.0}  # [mm, mm2]
+GIVES = 1e-5
+
+
+def growth(own: float, other: float) -> float:
+    """What so many tetrahedra of a muscle and of its neighbour add to the growth of a frame number."""
+    return 6e-7 * (own + 0.3 * other)
+
+
+def swell(problem, _settings, sink) -> Outcome:
+    """In place of the reference: the points of each muscle move away from the origin."""
+    counts = [len(one.mesh.tets) for one in problem.problems.values()]
+    give = GIVES * 0.1 / problem.law.stiffness
+    grows = [growth(*counts) + give, growth(*counts[::-1]) + give]
+    for number in problem.frames:
+        surface, fibres = problem.rest.surface.points.copy(), problem.rest.fibres.points.copy()
+        for span, more in zip(problem.spans, grows, strict=True):
+            surface[span.vertices] *= 1 + number * more
+            fibres[span.fibres] *= 1 + number * more
+        sink(Frame(number, surface, fibres))
+    return Outcome("converged", "done", {"seconds": 1.0})
+
+
+@pytest.fixture
+def two(tmp_path, monkeypatch) -> Path:
+    """The small scene with a thin bar beside the other one, solved by ``swell``."""
+    stand_ins.solve_by(monkeypatch, fenicsx, swell)
+    stand_ins.unchecked(monkeypatch)
+    monkeypatch.setattr(neighbours, "between", lambda *_: ())
+    folder = small.write(tmp_path / "two")
+    wide = small.body()
+    files.write_surface(folder / "wide.vtp", wide, wide.points)
+    files.write_surface(folder / "thin.vtp", wide, wide.points * [0.6, 0.6, 1.0] + [12.5, 0.0, 0.0])
+    text = (folder / "case.toml").read_text()
+    first, last = text.index("[muscle]"), text.index("[[bone]]")
+    text = text[:first] + "".join(OWN.format(name, size) for name, size in SIZES.items()) + text[last:]
+    for begin, end in (
+        ("[[attachment]]", "[[effect]]"),
+        ("[fibres]", "[frames]"),
+        ("[[expect]]", "[negative_control]"),
+    ):
+        text = text[: text.index(begin)] + text[text.index(end) :]
+    (folder / "case.toml").write_text(text.replace("[frames]", TOUCHING + "\n[frames]"))
+    return folder
+
+
+def test_each_muscle_has_bars_of_its_own_pair_with_all_meshes_coarser(two, monkeypatch) -> None:
+    monkeypatch.setattr(pages, "write", lambda _, folder, *__: folder)
+    monkeypatch.setattr(report, "of_comparison", lambda _: None)
+    target, store = two / "facts.json", two / "out" / "runs"
+    words = ["run", str(two), "--error-bar", "--out", str(two / "out"), "--json", str(target), "--quiet"]
+    assert cli.main(words) == cli.DONE
+    printed = json.loads(target.read_text())["muscles"]
+    case = casefile.read(two)
+    reference = solve(case, store=store)
+    assert set(muscle_bars.stored(Bench(case, store), reference)) == set(SIZES)
+    bars = {name: error_bars(case, reference, muscle=name, store=store) for name in SIZES}
+    fine, coarse = (Bench(one, store).problem() for one in (case, muscle_bars.coarser(case)[0]))
+    # Of order 1.5 in tetrahedra 1.5 times as large; the muscles touch, so that the factor of safety is the greater one of both.
+    left = 1.25 / (1.5**1.5 - 1) * max(SIZES[name] / np.sqrt(AREAS[name] / np.pi) for name in SIZES)
+    for name, other in (("wide", "thin"), ("thin", "wide")):
+        counts = [[len(built.problems[one].mesh.tets) for one in (name, other)] for built in (fine, coarse)]
+        assert (np.array(counts[1]) < counts[0]).all()
+        surface = fine.problems[name].surface
+        areas = vertex_areas(surface.points, surface.triangles)
+        furthest = metrics.rms(np.linalg.norm(surface.points, axis=1)[None], areas)[0]
+        # Twice the stiffness takes half of what contact gives away, twice that is all.
+        share = np.hypot(left * (growth(*counts[0]) - growth(*counts[1])), GIVES)
+        found = bars[name].find("change", "surface_deviation", "rms")
+        assert found.values == pytest.approx(np.array([0, 5, 10, 15, 20]) * furthest * share, rel=1e-6)
+        assert set(found.parts) == {
+            "tetrahedra",
+            *(f"contact between muscles {one}" for one in ("stiffness", "smoothing")),
+        }
+        rows = [
+            row["value"]
+            for row in printed[name]["error_bars"]
+            if (row["of"], row["metric"], row["statistic"]) == ("change", "surface_deviation", "rms")
+        ]
+        assert rows == pytest.approx(found.values)
+        assert bars[name].sizes == (SIZES[name], 1.5 * SIZES[name])
+    for name in ("", "other"):
+        with pytest.raises(InputError, match=r"muscle: got str '(other)?', want one of wide, thin"):
+            error_bars(case, reference, muscle=name, store=store)
+
+
+@pytest.mark.parametrize(("own", "wanted", "ratio"), [((0, 1), (0, 1), 1.5), ((1, 2), (0, 1), 2.0)])
+def test_all_muscles_are_coarser_by_the_same_ratio(two, own, wanted, ratio) -> None:
+    changes = {f"muscle[{i}].refinements": count for i, count in enumerate(own)}
+    case = casefile.read(two, changes=changes)
+    found, by = muscle_bars.coarser(case)
+    assert (tuple(one.refinements for one in found.muscle), by) == (wanted, ratio)
+    assert [one.tet_size for one in found.muscle] == [
+        (ratio if ratio == 1.5 else 1.0) * one.tet_size for one in case.muscle
+    ]
+
+
+def test_attachments_and_tetrahedra_of_each_muscle_vary(two) -> None:
+    case = casefile.read(two, changes={"muscle[0].attachment[0].stiffness": "1 kPa/mm"})
+    assert case.muscle[0].attachment[0].stiffness is not None
+    assert exactly_attached(case).muscle[0].attachment[0].stiffness is None
+    assert (
+        refinement.finer(Bench(case, two), solve(casefile.read(two), store=two / "runs"), 0.8).muscle[1].tet_size == 4.0
+    )
