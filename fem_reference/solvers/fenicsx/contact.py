@@ -181,7 +181,7 @@ class ContactForces:
 
     def scalars(self) -> dict[str, float]:
         """The greatest ``contact_depth`` [mm], ``contact_pressure`` [MPa] and ``PART.contact_pressure`` of parts; the rest area in
-        contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, the points whose distance was computed;
+        contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, those whose distance was computed;
         ``overlap_at_rest`` [mm] of the deepest point, removed or not; and ``friction_work`` [N mm], the total dissipated.
         """
         comm, touched, depth, pressure = self.comm, np.zeros(len(self.points.areas), bool), 0.0, 0.0
