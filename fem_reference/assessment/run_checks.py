@@ -241,15 +241,15 @@ def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
     for i, number in enumerate(run.numbers):
         poses, points = np.array([bone.pose(number) for bone in bones]), run.positions[i]
         posed = (one for earlier, one in seen if np.abs(poses - earlier).max(initial=0.0) <= near)
-        alike = (one for one in posed if np.abs(points[:9] - one[:9]).max() <= near)  # few need a full comparison
+        alike = (one for one in posed if np.abs(points[:9] - one[:9]).max() <= near)  # full comparisons are rare
         if not any(np.abs(points - one).max() <= near for one in alike):
             seen.append((poses, points))
             yield i, number
 
 
 def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
-    """Penetration of the muscle and each bone in contact. If the muscle's surface, whose triangles may be large, is deeper than
-    allowed, the boundary of its tetrahedra is checked too: the check fails if both are too deep.
+    """Penetration of the muscle and each bone in contact. If the surface, with possibly large triangles, is deeper than allowed,
+    the boundary of the tetrahedra is checked too: the check fails if both are too deep.
     """
     rest, apart = run.surface, spacing(problem.surface)
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))

@@ -158,9 +158,7 @@ class ContactForces:
             self.points.add_forces(residual, -self.points.areas[which, None] * found, which)
 
     def tangent(self) -> Iterator[tuple[Ints, Floats, Floats]]:
-        """The derivative of the residual, bone by bone: cells (p,) of the points in contact, the basis (p, k) there, and the
-        derivative ``slope`` (p, 3, 3) of the tractions.
-        """
+        """The derivative of the residual by bone: cells (p,) of pressed points, their basis (p, k), traction slopes (p, 3, 3)."""
         for one in self.now:
             if len(touched := one.pressed):
                 areas = self.points.areas[touched, None, None]
@@ -284,7 +282,7 @@ class ContactForces:
         met, starts, ends = self.nearby[i].crossing(there, here)
         before, now = (self.bones[i].shape.sample(places) for places in (starts, ends))
         displacements = ends - starts
-        # Far away no gap is known: the outward direction is then against the travel at the start, and along it at the end.
+        # Far away no gap is known: outward is then opposite to the travel at the start, and along the travel at the end.
         outward = [
             np.where(one.gradient.any(axis=1)[:, None], one.gradient, sign * displacements)
             for one, sign in ((before, -1), (now, 1))
