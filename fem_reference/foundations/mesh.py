@@ -17,6 +17,7 @@ from fem_reference.foundations.errors import InputError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 # The greatest coordinate [mm] of a surface: a thousand kilometres.
 FARTHEST = 1e9
