@@ -125,6 +125,11 @@ def tet_volumes(points: Floats, tets: Ints) -> Floats:
     return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6)
 
 
+def upright(points: Floats, tets: Ints) -> Ints:
+    """The ``tets`` (k, 4) between ``points`` (n, 3), those of negative volume with two corners exchanged."""
+    return np.where((tet_volumes(points, tets) < 0)[:, None], tets[:, [0, 2, 1, 3]], tets)
+
+
 def tet_qualities(points: Floats, tets: Ints) -> Floats:
     """Mean-ratio quality (k,) of ``tets`` (k, 4) between ``points`` (n, 3): 1 if regular, 0 if flat (Liu and Joe 1994)."""
     squares = sum(np.sum((points[tets[:, i]] - points[tets[:, j]]) ** 2, axis=1) for i in range(4) for j in range(i))

@@ -12,6 +12,7 @@ from fem_reference.foundations.mesh import (
     enclosed_volume,
     tet_qualities,
     tet_volumes,
+    upright,
 )
 from fem_reference.geometry.coarsening import inflate
 from fem_reference.geometry.distance import distances
@@ -83,9 +84,7 @@ def _eighths(points: Floats, nodes: Ints) -> Ints:
     ends = points[nodes[:, _DIAGONALS]]
     shortest = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2).argmin(axis=1)
     tets = np.take_along_axis(nodes, PARTS[shortest].reshape(len(nodes), -1), axis=1).reshape(-1, 4)
-    turned = tet_volumes(points, tets) < 0
-    tets[turned] = tets[turned][:, [0, 2, 1, 3]]
-    return tets
+    return upright(points, tets)
 
 
 def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
