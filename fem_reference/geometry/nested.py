@@ -1,9 +1,9 @@
 """Refinement of each tetrahedron into eight: nested, graded towards rims, with the boundary moved onto the filled surface."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import (
+    Bools,
     Floats,
     Ints,
     Surface,
@@ -38,8 +38,6 @@ GRADED = 0.25
 # A point moves towards the surface as long as the tets around it keep these shares of their volume and of their quality.
 _KEPT_VOLUME, _KEPT_QUALITY = 0.3, 0.5
 _ROUNDS, _SHORTER = 12, 0.6
-
-Bools = NDArray[np.bool_]
 
 
 def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) -> TetMesh:
