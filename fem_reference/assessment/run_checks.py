@@ -138,11 +138,6 @@ def worst(checks: Iterable[RunCheck]) -> RunChecks:
     return tuple(found.values())
 
 
-@lru_cache(maxsize=8)
-def _areas(surface: Surface) -> Floats:
-    return vertex_areas(surface.points, surface.triangles)
-
-
 def _at(name: str, values: Floats, allowed: Floats, frame: float, places: Floats) -> RunCheck:
     """The check at the point (n, 3) whose ``values`` (n,) [mm] are nearest to ``allowed`` (n,), or exceed it most."""
     i = int(np.argmax(values / allowed))
@@ -169,7 +164,7 @@ def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iter
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets_away = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
-    weights = _areas(problem.surface)[entry.vertices]
+    weights = vertex_areas(problem.surface.points, problem.surface.triangles)[entry.vertices]
     size, forces = diagonal(problem.surface.points), run.scalars.get(f"force_{entry.attachment}")
     at_rest = 0.0 if forces is None or in_situ.among(problem.effects) is None else float(forces[0])
     for i, number in enumerate(run.numbers):
@@ -243,9 +238,7 @@ def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
     for i, number in enumerate(run.numbers):
         poses, points = np.array([bone.pose(number) for bone in bones]), run.positions[i]
         posed = (one for earlier, one in seen if np.abs(poses - earlier).max(initial=0.0) <= near)
-        alike = (
-            one for one in posed if np.abs(points[:9] - one[:9]).max() <= near
-        )  # few frames need a full comparison
+        alike = (one for one in posed if np.abs(points[:9] - one[:9]).max() <= near)  # few need a full comparison
         if not any(np.abs(points - one).max() <= near for one in alike):
             seen.append((poses, points))
             yield i, number
