@@ -23,7 +23,7 @@ if sys.version_info[:2] < (3, 12):  # noqa: UP036 - who imports a checkout has n
     wanted = "fem_reference needs Python 3.12 or newer: python3.12 -m venv .venv, and install it there"
     raise ImportError(f"this is Python {sys.version.split()[0]} ({sys.executable}); {wanted}")
 
-# The public names, each with its module and its name there: those that the stub beside this file imports.
+# The public names, each with its module and its name in it; the stub beside this file imports the same names.
 _PLACES = {
     alias.asname or alias.name: (node.module or "", alias.name)
     for node in ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")).body

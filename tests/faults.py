@@ -24,6 +24,7 @@ import tomllib
 from collections import Counter
 from contextlib import suppress
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -75,8 +76,11 @@ def fingerprint(root: Path, fault: Fault) -> str:
 def statements(path: Path) -> str:
     """The statements of a Python file, without comments, docstrings, layout and marks of slow tests; the text of any other file."""
     text = path.read_text(encoding="utf-8")
-    if path.suffix != ".py":
-        return text
+    return _statements(text) if path.suffix == ".py" else text
+
+
+@cache
+def _statements(text: str) -> str:
     tree = ast.parse(text)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
@@ -182,7 +186,7 @@ def planted(chosen: list[Fault]) -> int:
     counts = Counter[str]()
     with tempfile.TemporaryDirectory(prefix="faults-") as folder:
         copy = Path(folder) / "copy"
-        ignored = shutil.ignore_patterns(".git", ".venv", "__pycache__", "reports")
+        ignored = shutil.ignore_patterns(".git", ".venv", "*.pyc.*", "reports")
         shutil.copytree(ROOT, copy, ignore=ignored)
         for fault in chosen:
             begin, text = time.perf_counter(), fingerprint(copy, fault)

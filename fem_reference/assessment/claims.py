@@ -49,9 +49,7 @@ class Cover:
 
 @dataclass(frozen=True, eq=False)
 class Claims:
-    """All claims; by case the ``sizes`` [mm] of the reference's and the finer tetrahedra; ``missing``: by case, why it has no
-    claims.
-    """
+    """All claims; by case the ``sizes`` [mm] of the reference's and the finer tetrahedra; ``missing``: why a case has no claims."""
 
     claims: tuple[Claim, ...]
     sizes: dict[str, tuple[float, float]]
@@ -61,7 +59,7 @@ class Claims:
 def claimed(
     case: str, of: Of, bars: ErrorBars, reference: tuple[Measure, ...], finer: tuple[Measure, ...]
 ) -> list[Claim]:
-    """The claims of the ``bars`` of a reference, each with the difference of its measures from those of a ``finer`` solution."""
+    """The claims of the ``bars`` of a reference, each with the difference of its measures from a ``finer`` solution."""
     found = []
     for metric, statistic in CLAIMED:
         bar = bars.find(of, metric, statistic)

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fem_reference import metrics
 from fem_reference.assessment.error_bars import ErrorBars, Of
 from fem_reference.assessment.judge import Verdict, Word, doubted, doubts, overall, resolved, verdict
 from fem_reference.assessment.ranking import Ranking, rankings
@@ -14,17 +15,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import table
 from fem_reference.foundations.mesh import Ints
 from fem_reference.foundations.records import join
-from fem_reference.metrics import (
-    Context,
-    Measure,
-    MeasurementContext,
-    at_rest,
-    context_of,
-    described,
-    find,
-    measure,
-    names,
-)
+from fem_reference.metrics import Context, Measure, MeasurementContext, find
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.problems.of_case import CaseSetup
 from fem_reference.runs.store import Run, complete
@@ -90,7 +81,7 @@ class Comparison:
             (name, f"{one.metric}.{one.statistic}", f"{it.value:.4g} {it.unit}", known, it.frame)
             for name, measures in self.deviations.items()
             for one in measures
-            if (one.metric, one.statistic) in described("main")
+            if (one.metric, one.statistic) in metrics.described("main")
             for it in [one.worst]
             for known in ["" if it.error_bar is None else f"± {it.error_bar:.2g} {it.unit}"]
         ]
@@ -136,11 +127,11 @@ def compare(
     ``candidates`` have all frames of the case, with NaN for frames not reached; a measure that is uncertain within ``error_bars``
     is inconclusive. InputError if the case expects a measure of a named run that lacks it because it has no surface.
     """
-    context, runs = context_of(setup, reference), (reference, *candidates)
-    candidate, alone = names(case.standards("candidates")), names(case.standards("reference"))
-    apart = {run.name: measure(run, reference, context, candidate) for run in candidates}
+    context, runs = metrics.context_of(setup, reference), (reference, *candidates)
+    candidate, alone = metrics.names(case.standards("candidates")), metrics.names(case.standards("reference"))
+    apart = {run.name: metrics.measure(run, reference, context, candidate) for run in candidates}
     deviations = {name: _with_bars(found, "deviation", error_bars) for name, found in apart.items()}
-    changes = {run.name: measure(run, at_rest(run), context, alone) for run in runs}
+    changes = {run.name: metrics.measure(run, metrics.at_rest(run), context, alone) for run in runs}
     changes["reference"] = _with_bars(changes["reference"], "change", error_bars)
     measured = {"reference": changes["reference"]} | deviations
     for i, one in enumerate(map(resolved, case.expect)):
@@ -173,7 +164,7 @@ def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
     """The measures and verdicts of a ``run`` without a reference; none for a muscle, whose measures need a reference's context."""
     if "reference" in case.standards("reference"):
         return Alone((), (), "not judged")
-    measures = measure(run, run, context_of(setup, run), names(case.standards("reference")))
+    measures = metrics.measure(run, run, metrics.context_of(setup, run), metrics.names(case.standards("reference")))
     expected = [one for one in map(resolved, case.expect) if one.of == run.name and _is_measured(one, measures)]
     verdicts = tuple(verdict(one, measures, run.numbers) for one in expected)
     return Alone(measures, verdicts, doubted(overall(one.word for one in verdicts), doubts(run)))

@@ -121,8 +121,8 @@ class Row:
 
     @property
     def grade(self) -> Grade:
-        """Outside if one measurement is not met; else validated if some measurement counts as validation, otherwise indicative.
-        Verified only if no experiment is known; not measured if its data is not installed. Other models do not count.
+        """The grade: "outside" if one measurement is not met, else "validated" if some measurement counts as validation, else
+        "indicative". Without a known experiment it is "verified only", without its data "not measured". Other models do not count.
         """
         met, of = self.measured
         if of == 0:
@@ -171,7 +171,7 @@ def of_result(found: Result) -> Beside:
 
 
 def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> str:
-    """The worst text in which ``facts`` were read, with notes: a tolerance chosen by us, or a part of the model from memory."""
+    """The least reliable text in which ``facts`` were read, with notes: a tolerance of ours, a part of the model from memory."""
     read = max((one.read_in for one in facts), key=_READ.index, default="not known")
     chosen = not is_order and not (facts and all(one.sd for one in facts))
     remembered = from_memory and all(one.doi_confirmed == "yes" for one in facts)
@@ -201,7 +201,7 @@ def of_arms(arms: ArmsBeside) -> Beside:
 
 
 def reached(arms: ArmsBeside) -> float:
-    """The share of poses inside, or the overlap [%], that fibres of Modenese and Kohout 2020 reach on the same body."""
+    """The share of poses inside, or the overlap [%], for the fibres of Modenese and Kohout 2020 on the same body."""
     quantity = "share_inside" if arms.is_curve else "overlap"
     return experiments.find("modenese_kohout_2020", quantity, arms.muscle.replace("_", " ")).value
 
@@ -229,9 +229,7 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class Credibility:
-    """The evidence of all quantities: ``rows``, moment ``arms``, by case the reason why arms are ``missing``, and ``fits`` of laws
-    to the cubes.
-    """
+    """The evidence of all quantities: ``rows``; moment ``arms``; ``missing``: why a case has none; ``fits`` of laws to cubes."""
 
     rows: tuple[Row, ...]
     arms: tuple[ArmsBeside, ...]

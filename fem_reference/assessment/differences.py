@@ -23,9 +23,7 @@ def greatest(values: Floats) -> float:
 
 
 def ratio(differences: Floats, scale: Floats) -> float:
-    """The root mean square of ``differences`` (f,) over that of ``scale`` (f,), in frames in which both are known; NaN if the scale
-    is 0.
-    """
+    """The ratio of the root mean squares of ``differences`` (f,) and ``scale`` (f,), in frames with both; NaN if the scale is 0."""
     known = np.isfinite(differences) & np.isfinite(scale)
     squares = float(scale[known] @ scale[known])
     return math.sqrt(float(differences[known] @ differences[known]) / squares) if squares > 0 else math.nan

@@ -212,7 +212,7 @@ def _rms_of_surface(statistics: tuple[Measure, ...], values: list[Floats]) -> Fl
 
 
 def _less(measures: tuple[Measure, ...], others: tuple[Measure, ...]) -> list[Floats]:
-    """The values (f,) of ``measures`` minus those of ``others``, by statistic."""
+    """The values (f,) of ``measures`` minus the values of ``others``, by statistic."""
     return [one.values - other.values for one, other in zip(measures, others, strict=True)]
 
 

@@ -30,9 +30,8 @@ def force_bars(pair: Pair, context: MeasurementContext) -> tuple[ErrorBar, ...]:
                 size = _length(kind, bone, *runs)
                 parts[name] = left[name] * typical(size, apart[name], moved if name == TETRAHEDRA else None)
             bar = together(parts, np.ones(len(moved), bool))
-            model = (
-                SPREAD * _length(kind, bone, pair.fine) if pair.springs else None
-            )  # the change by springs that are spread in another way
+            # The change by springs that are spread in another way.
+            model = SPREAD * _length(kind, bone, pair.fine) if pair.springs else None
             if model is not None and pair.exact is not None:
                 model = np.fmax(model, _length(kind, bone, pair.exact, pair.coarse))
             bars.append(ErrorBar("change", f"{kind}_on_bone", bone, unit, *bar, model))

@@ -141,9 +141,7 @@ class Match:
 
 
 def match(points: Iterable[Point], error: str, cost: str, *, same: str, at: float) -> Match:
-    """The best point of each solver whose error or cost ``same`` is at most ``at``; among equally good points the one with less of
-    it.
-    """
+    """The best point of each solver whose error or cost ``same`` is at most ``at``; of equally good points the one with less."""
     i = 0 if same == error else 1
     known = [(pair, point) for point in points if (pair := point.at(error, cost)) and pair[i] <= at]
     best = dict[str, Point]()

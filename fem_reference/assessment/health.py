@@ -23,10 +23,10 @@ from fem_reference.problems.setup import Bone
 class Followed:
     """A run whose health is measured. ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame
     ``numbers``; for a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3). ``bones``: bones with which ``free``
-    (n,) vertices may be in contact. ``truth`` (f, n, 3): the same vertices in the reference, if it has them. ``integrated`` (f,):
-    V/V0 from the solver. If known, ``negative_modes`` (f,), ``material_modes`` (f,), the negative modes that the material certainly
-    has, and ``least_determinant`` (f,), the least det F. For a scalar field its ``values`` (f, N) and the ``range`` of its boundary
-    values. ``spans``: the parts of each of several bodies.
+    (n,) vertices may be in contact. ``truth`` (f, n, 3): the same vertices in the reference, if it has them. ``integrated`` (f,),
+    of several bodies (f, b): V/V0 from the solver. If known, ``negative_modes`` (f,), ``material_modes`` (f,), the negative modes
+    that the material certainly has, and ``least_determinant`` (f,), the least det F. For a scalar field its ``values`` (f, N) and
+    the ``range`` of its boundary values. ``spans``: the parts of each of several bodies.
     """
 
     numbers: tuple[int, ...]
@@ -48,10 +48,11 @@ class Followed:
     @cached_property
     def bodies(self) -> "tuple[Followed, ...]":
         """The run of each body; the run itself if there is only one body."""
-        return tuple(map(self._of, self.spans)) or (self,)
+        return tuple(self._of(i, span) for i, span in enumerate(self.spans)) or (self,)
 
-    def _of(self, span: Span) -> "Followed":
-        """The surface and the tetrahedra of the body at a ``span``."""
+    def _of(self, i: int, span: Span) -> "Followed":
+        """The surface, the tetrahedra and the volume of body number ``i``, at a ``span``."""
+        integrated = None if self.integrated is None else self.integrated[:, i]
         triangles, mesh, nodes = self.surface.triangles - span.vertices.start, self.mesh, self.nodes
         own = ((triangles >= 0) & (triangles < span.vertices.stop - span.vertices.start)).all(axis=1)
         if mesh is not None and nodes is not None:
@@ -60,7 +61,7 @@ class Followed:
             )
             nodes = nodes[:, span.points]
         surface = Surface(self.surface.points[span.vertices], triangles[own])
-        return Followed(self.numbers, surface, self.positions[:, span.vertices], mesh, nodes)
+        return Followed(self.numbers, surface, self.positions[:, span.vertices], mesh, nodes, integrated=integrated)
 
     @property
     def size(self) -> float:

@@ -71,9 +71,7 @@ def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> 
 
 
 def overall(words: Iterable[Word]) -> Word:
-    """The combined verdict: the first of fail, inconclusive, doubtful pass and pass among the ``words``, if any; else not
-    judged.
-    """
+    """The combined verdict: the first of fail, inconclusive, doubtful pass and pass among the ``words``; else not judged."""
     found = set(words)
     order: tuple[Word, ...] = ("fail", "inconclusive", "doubtful pass", "pass")
     return next((word for word in order if word in found), "not judged")

@@ -15,7 +15,7 @@ from fem_reference.scenes.muscle import MuscleCase
 
 @dataclass(frozen=True, eq=False)
 class CurrentMeasures:
-    """A candidate as it is now, measured against the ``reference`` with its ``error_bars``, None if unknown."""
+    """The present candidate, measured against the ``reference`` with its ``error_bars``, None if unknown."""
 
     scene: MuscleCase
     candidate: Run

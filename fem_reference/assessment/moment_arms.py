@@ -105,9 +105,7 @@ class ArmsBeside:
 
     @property
     def bias(self) -> float:
-        """The mean [mm] over the known poses of the fibres' mean arm minus the published arm, or the middle of its range; NaN for
-        none.
-        """
+        """The mean [mm] over known poses of the fibres' mean arm minus the published arm or middle of the range; NaN for none."""
         return float(self._off.mean()) if self._off.size else float("nan")
 
     @property

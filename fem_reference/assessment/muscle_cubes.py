@@ -48,9 +48,7 @@ def with_collagen(fibres: float, k1: float, k2: float) -> Material:
 
 @lru_cache(1000)
 def cube(material: Material, stretch: float, degrees: float, *, confined: bool = False) -> CubeState:
-    """A cube loaded along x to a ``stretch``, with fibres at ``degrees`` to x in the plane of x and y; if ``confined``, the cube
-    cannot deform along z.
-    """
+    """A cube loaded along x to a ``stretch``, with fibres at ``degrees`` to x in the xy plane; ``confined``: fixed along z."""
     fibre = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0])
     return loaded(material, (stretch, FREE, 1.0 if confined else FREE), fibre)
 

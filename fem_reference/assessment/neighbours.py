@@ -47,9 +47,7 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
 
 
 def depths(runs: Mapping[str, Run]) -> Iterator[tuple[str, str, Floats]]:
-    """The names of each pair of muscles and the depth (f,) [mm] of their overlap at the frames of their ``runs``, NaN if a run has
-    no surface.
-    """
+    """The names of each pair of muscles and the depth (f,) [mm] of their overlap in their ``runs``, NaN without a surface."""
     for one, other in combinations(runs, 2):
         found = list[float]()
         for a, b in zip(runs[one].positions, runs[other].positions, strict=True):

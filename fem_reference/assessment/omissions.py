@@ -50,9 +50,7 @@ class Omission:
 
 @dataclass(frozen=True)
 class Ablation:
-    """A run ``name`` by ``solver``: the complete run (``whole``), and a run with each of the ``omissions``; ``kept``: names never
-    left out.
-    """
+    """Runs ``name`` by ``solver``: the complete one (``whole``), and one for each of ``omissions``; ``kept``: never left out."""
 
     name: str
     solver: str
@@ -61,11 +59,11 @@ class Ablation:
     omissions: tuple[Omission, ...]
 
     def relative(self, seconds: float) -> float:
-        """A time [s] over that of the complete run, NaN if one is unknown."""
+        """A time [s] over the time of the complete run, NaN if one is unknown."""
         return seconds / (self.whole.seconds or math.nan)
 
     def count(self, omission: Omission, name: str) -> float:
-        """One of ``COUNTS`` over that of the complete run, NaN if one is unknown."""
+        """One of ``COUNTS`` over its value in the complete run, NaN if one is unknown."""
         return omission.costs.get(name, math.nan) / (self.whole.costs.get(name) or math.nan)
 
 

@@ -41,7 +41,7 @@ class Expected:
         return max(self.error - self.bar, self.bar)
 
     def misses(self, limits: Mapping[str, float]) -> float:
-        """The greater ratio of its error or time to the ``limits``."""
+        """The greater of the ratios of error and time to their ``limits``."""
         own = {"error": self.error, "time": self.time}
         return max(own[name] / limit for name, limit in limits.items())
 
@@ -185,9 +185,7 @@ def _is_share(metric: str) -> bool:
 
 
 def _translated(point: Point, study: CaseStudy, features: Features) -> Point:
-    """A point of a study for another case: tetrahedra relative to those of the case, doubled in size for each refinement below
-    zero.
-    """
+    """A point of a study for another case: tetrahedra relative to the case's, doubled in size for each refinement below zero."""
     scene = dict(point.choice.get("scene", {}))
     if not set(TETRAHEDRA) <= set(scene):
         return point

@@ -153,9 +153,7 @@ def _of_statistic(name: str, stored: StoredStatistic, current: CurrentMeasures) 
 def _judged(
     question: Question, what: tuple[str, str], frames: _Frames, allowed: float, current: CurrentMeasures
 ) -> Judgement:
-    """The judgement by the decisive frame: among frames with the decisive word, the farthest from its target or with the widest
-    bar.
-    """
+    """The judgement by the decisive frame: with the decisive word, the farthest from its target or with the widest bar."""
     words = [_word(*map(float, row), allowed=allowed) for row in zip(*frames, strict=True)]
     word = judge.overall(words)
     deciding = frames.bars if word == "inconclusive" else np.abs(frames.current - frames.truth)

@@ -34,7 +34,7 @@ _SPRINGS = 1.5
 _TURN = 1.01 * math.pi / 2
 # Between contact points, half a spacing apart, a right-angled edge can penetrate by a quarter of the spacing, a crease by less.
 _BETWEEN, _CREASE = 0.25, 0.1
-# Self-contact of a part allows a penetration of less than this share of the spacing, whatever pressure is recorded.
+# Self-contact of a part allows a penetration of less than this share of the spacing, for any recorded pressure.
 _OWN = 0.5
 # A bone that penetrates by more than this share of half its thickness has broken through contact, for any stiffness.
 _GIVEN_WAY = 0.75
@@ -98,9 +98,7 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch. Allowed: smoothing, pressure over stiffness, overlap between points, and the rest of the
-    overlap at rest.
-    """
+    """Overlap of parts that may touch. Allowed: smoothing, pressure over stiffness, overlap between points and left from rest."""
     for law in body.touching:
         apart, depth = longest_edge(body.mesh, law) / 4, partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
@@ -138,6 +136,11 @@ def worst(checks: Iterable[RunCheck]) -> RunChecks:
     return tuple(found.values())
 
 
+@lru_cache(maxsize=8)
+def _areas(surface: Surface) -> Floats:
+    return vertex_areas(surface.points, surface.triangles)
+
+
 def _at(name: str, values: Floats, allowed: Floats, frame: float, places: Floats) -> RunCheck:
     """The check at the point (n, 3) whose ``values`` (n,) [mm] are nearest to ``allowed`` (n,), or exceed it most."""
     i = int(np.argmax(values / allowed))
@@ -164,7 +167,7 @@ def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iter
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets_away = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
-    weights = vertex_areas(problem.surface.points, problem.surface.triangles)[entry.vertices]
+    weights = _areas(problem.surface)[entry.vertices]
     size, forces = diagonal(problem.surface.points), run.scalars.get(f"force_{entry.attachment}")
     at_rest = 0.0 if forces is None or in_situ.among(problem.effects) is None else float(forces[0])
     for i, number in enumerate(run.numbers):
@@ -238,15 +241,15 @@ def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
     for i, number in enumerate(run.numbers):
         poses, points = np.array([bone.pose(number) for bone in bones]), run.positions[i]
         posed = (one for earlier, one in seen if np.abs(poses - earlier).max(initial=0.0) <= near)
-        alike = (one for one in posed if np.abs(points[:9] - one[:9]).max() <= near)  # few need a full comparison
+        alike = (one for one in posed if np.abs(points[:9] - one[:9]).max() <= near)  # full comparisons are rare
         if not any(np.abs(points - one).max() <= near for one in alike):
             seen.append((poses, points))
             yield i, number
 
 
 def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
-    """Penetration of the muscle and each bone in contact. If the muscle's surface, whose triangles may be large, is deeper than
-    allowed, the boundary of its tetrahedra is checked too: the check fails if both are too deep.
+    """Penetration of the muscle and each bone in contact. If the surface, with possibly large triangles, is deeper than allowed,
+    the boundary of the tetrahedra is checked too: the check fails if both are too deep.
     """
     rest, apart = run.surface, spacing(problem.surface)
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
@@ -263,9 +266,7 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 
 
 def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
-    """Penetration of a bone and the muscle; above the ``give`` only the part in excess of rest counts. Penetration to the middle of
-    a bone is never allowed.
-    """
+    """Penetration of a bone and the muscle; above the ``give`` only the excess over rest counts, and never to the bone's middle."""
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:

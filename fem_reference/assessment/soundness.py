@@ -6,8 +6,8 @@ from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume
 from fem_reference.geometry.distance import outer_windings
 from fem_reference.runs.store import Run
 
-# The enclosed volume over that of the reference: below the first value the body has collapsed, above the second it has exploded.
-# The worst of the shipped solvers has 0.8.
+# The enclosed volume over the volume in the reference: below the first value the body has collapsed, above the second it has
+# exploded. The worst of the shipped solvers has 0.8.
 _LEAST, _MOST = 0.5, 2.0
 # The greatest distance of a vertex from the reference, over the size of the body.
 _FARTHEST = 1.0

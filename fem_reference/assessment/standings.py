@@ -145,9 +145,7 @@ def load(path: Path) -> tuple[Standing, ...]:
 
 
 def changes(before: Iterable[Standing], after: Iterable[Standing]) -> tuple[str, ...]:
-    """Rows that are new, gone, or of another status, and errors that changed by more than the error bar of the reference, in
-    words; empty without rows ``before``.
-    """
+    """New rows, missing rows, changes of status, and errors changed by more than their bar, in words; empty without ``before``."""
     old, new = ({(row.case, row.name): row for row in rows} for rows in (before, after))
     if not old:
         return ()

@@ -137,7 +137,7 @@ def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> 
 
 
 def doubted(cell: Cell, doubt: str, no_solution: str) -> Cell:
-    """``cell`` with a ``doubt`` about the solver's result, if any: degraded, but correct where there is ``no_solution``."""
+    """``cell`` with a ``doubt`` about the solver's result, if any: degraded, but correct if there is ``no_solution``."""
     if not doubt or cell.verdict != "ok":
         return cell
     if no_solution:

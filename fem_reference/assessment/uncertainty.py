@@ -109,9 +109,7 @@ class Band:
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A candidate compared with a band: its ``values`` (f,), and by frame its ``places``, empty without a band or an expected
-    value.
-    """
+    """A candidate and a band: its ``values`` (f,), and by frame its ``places``, empty without a band or an expected value."""
 
     candidate: str
     quantity: str

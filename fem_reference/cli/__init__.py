@@ -26,9 +26,8 @@ _CHECKOUT = Path(__file__).resolve().parents[2]  # the checkout, or the folder i
 def entry() -> None:
     """The installed command."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that running work is cleaned up
-    os.environ.setdefault(
-        "OPENBLAS_NUM_THREADS", "1"
-    )  # numpy reads it when it is loaded; on a busy machine more threads would wait for each other
+    # Numpy reads it when it is loaded; on a busy machine more threads would wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     sys.exit(main(sys.argv[1:]))
 
 
@@ -68,7 +67,7 @@ def _explain(message: str, options: argparse.Namespace) -> None:
 
 
 def _why_broken(error: BaseException) -> str:
-    """The message for an unexpected exception: its text, its place, and what to do."""
+    """The message for an unexpected exception: its text, its place, and a remedy."""
     if isinstance(error, MemoryError):
         return "not enough memory; nothing was judged. Smaller input, or larger tetrahedra, need less"
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("fem_reference"):
@@ -126,7 +125,7 @@ def out(options: argparse.Namespace) -> Path:
 
 
 def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) -> None:
-    """Print ``text``, and write ``facts`` as JSON if ``--json`` asks for it."""
+    """Print ``text``; with ``--json`` also write ``facts`` as JSON."""
     print(text)
     _explain(text, options)
     if options.json is not None:
@@ -134,7 +133,7 @@ def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) 
 
 
 def write(path: Path | None, text: str) -> None:
-    """Write ``text`` to ``path``, if there is one, in a folder that is made where it does not exist."""
+    """Write ``text`` to ``path``, if given, in a folder that is created if necessary."""
     if path is not None:
         from fem_reference.io import files
 

@@ -37,14 +37,14 @@ def scene_of(options: argparse.Namespace) -> Case:
 
 
 def muscle_case(case: str, options: argparse.Namespace, *, quick: bool) -> MuscleCase:
-    """The ``case`` of a muscle, if asked at its ``quick`` size; keys changed by ``--set`` take precedence."""
+    """The ``case`` of a muscle, at its ``quick`` size if requested; keys changed by ``--set`` take precedence."""
     given = dict(map(casefile.setting, options.set))
     sizes = casefile.read_muscle(case, given).quick if quick else {}
     return casefile.read_muscle(case, sizes | given)
 
 
 def _expectation(text: str, units: Mapping[str, str]) -> Expectation:
-    """The expectation that METRIC.STATISTIC=VALUE states for every candidate; ``units``: those of all statistics, by name."""
+    """The expectation that METRIC.STATISTIC=VALUE states for every candidate; ``units``: the units of all statistics, by name."""
     name, _, within = (part.strip() for part in text.partition("="))
     metric, dot, statistic = name.partition(".")
     if not dot or not within:
@@ -104,7 +104,7 @@ def check_names(names: list[str]) -> None:
     """InputError if two candidates have the same name, or one has the name of the reference."""
     for name in names:
         if name == "reference":
-            raise InputError("--candidate", '"reference"', "another name: this is what candidates are measured against")
+            raise InputError("--candidate", '"reference"', "another name: candidates are measured against this run")
         if names.count(name) > 1:
             raise InputError("--candidate", f'"{name}" twice', "folders and candidates of different names")
 
@@ -138,7 +138,7 @@ def asked(verb: str, case: Case, options: argparse.Namespace, page: str, *more: 
 
 
 def candidates(case: Case, chosen: Iterable[Candidate]) -> tuple[Part, ...]:
-    """The parts of a page's name for its candidates; none where they are the case's own."""
+    """The parts of a page's name for its candidates; none if they are the candidates of the case."""
     found = tuple(chosen)
     if found == case.candidate:
         return ()
@@ -156,7 +156,7 @@ def publish(options: argparse.Namespace, asked: Asked, page: Page, facts: dict[s
 
 
 def judged(bench: Bench[Case], options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Comparison:
-    """The runs of a case, measured and judged with error bars if these are asked for or cheap."""
+    """The runs of a case, measured and judged with error bars if these are requested or cheap."""
     reference, *runs = bench.runs(chosen)
     bars = refinement.offered(bench, reference, asked=options.error_bar)
     return judging.compare(bench, reference, runs, bars)
@@ -176,7 +176,7 @@ def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candida
 
 
 def _page(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]], page: str) -> Asked:
-    """The ``page`` of a comparison; a page of the reference alone where the case has candidates and none is chosen."""
+    """The ``page`` of a comparison; a page of the reference alone if the case has candidates and none is chosen."""
     alone = bool(case.candidate) and not chosen
     who = (Part((), "reference"),) if alone else candidates(case, [entry for entry, _ in chosen])
     return asked("run" if alone else "compare", case, options, page, *who)

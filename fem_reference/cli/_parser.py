@@ -45,7 +45,7 @@ _SHARED: dict[str, dict[str, Any]] = {
     },
     "--error-bar": {
         "action": "store_true",
-        "help": "compute error bars of the reference: solve it on larger tetrahedra too, with stiffer contact where bones press",
+        "help": "compute error bars of the reference: solve it on larger tetrahedra too, with stiffer contact if bones press",
     },
     "--negative-control": {
         "action": "store_true",
@@ -54,12 +54,12 @@ _SHARED: dict[str, dict[str, Any]] = {
     "--name": {
         "dest": "page_name",
         "metavar": "NAME",
-        "help": "name of the page (default: the case with what makes the page different, such as CASE-KEY=VALUE)",
+        "help": "name of the page (default: the case with its changes, such as CASE-KEY=VALUE)",
     },
     "--ranks": {
         "type": positive,
         "metavar": "N",
-        "help": "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)",
+        "help": "MPI processes of the reference (default: 1, or 2 for large bodies if cores are free)",
     },
     "--workers": {"type": int, "default": 1, "metavar": "N", "help": "number of runs made at once (default: 1)"},
     "--scheduler": {
@@ -70,7 +70,7 @@ _SHARED: dict[str, dict[str, Any]] = {
 
 
 def share(parser: argparse.ArgumentParser, *names: str) -> None:
-    """Add those options, by name, that several verbs share."""
+    """Add options that several verbs share, by name."""
     for name in names:
         parser.add_argument(name, **_SHARED[name])
 
@@ -86,7 +86,7 @@ def verb(name: str) -> ModuleType:
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
-    """The parser of the whole command line; with ``only`` it imports that verb alone, as loading all of them takes seconds."""
+    """The parser of the whole command line; with ``only`` it imports this verb alone, as loading all verbs takes seconds."""
     about = "Finite element reference and validation for muscle deformation."
     whole = argparse.ArgumentParser(prog="fem-reference", description=about)
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
@@ -103,7 +103,7 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
 
 
 def _add(verb: ModuleType, sub: argparse.ArgumentParser) -> None:
-    """Add the options of a verb, and those that all verbs have."""
+    """Add the options of a verb, and the options of all verbs."""
     sub.register("action", None, _Given)
     sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, negative_control=False)
     sub.set_defaults(limit=[], writes=True, page_name=None)

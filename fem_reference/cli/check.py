@@ -1,7 +1,7 @@
 """The verb ``check``: a candidate against its own earlier results and against the reference, for the author's pipeline.
 
-An inconclusive result has exit status 0: an uncertain reference is not the fault of the change that is checked. The text and the
-Markdown file state that it is inconclusive; the JUnit file has it as skipped.
+An inconclusive result has exit status 0: an uncertain reference is not the fault of the checked change. The text and the Markdown
+file call such a result inconclusive, the JUnit file skipped.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""The verb ``compare``: candidates against the reference, or one of them against its earlier version."""
+"""The verb ``compare``: candidates against the reference, or a candidate against its earlier version."""
 
 import argparse
 from pathlib import Path
@@ -25,10 +25,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     share(parser, "case", "--set")
     either = "a candidate of the case or a folder of frames; may be repeated"
     parser.add_argument("--candidate", action="append", metavar="NAME|DIR", help=either)
-    ours = "a shipped solver as a candidate, with its standard settings where the case has none; may be repeated"
+    ours = "a shipped solver as a candidate, with its standard settings if the case has none; may be repeated"
     parser.add_argument("--solver", action="append", default=[], metavar="NAME", help=ours)
     share(parser, "--solver-command")
-    past = "write the page of what changed since earlier results: a baseline of check, a stored run, a folder of frames"
+    past = "write the page of changes since earlier results: a baseline of check, a stored run, a folder of frames"
     parser.add_argument("--against", type=Path, metavar="BASELINE", help=past)
     share(parser, "--unit")
     limit = "judge candidates: greatest deviation of a statistic, such as surface_deviation.max='5 mm'; may be repeated"
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _against(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
-    """Measure the one candidate and its earlier version, and write the page of changes."""
+    """Measure a candidate and its earlier version, and write the page of changes."""
     scene = casefile.muscle(case, "--against")
     if len(chosen) != 1:
         raise InputError("--against", f"{len(chosen)} candidates", "one, by --candidate or --solver")

@@ -33,7 +33,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     either = f"for {PARAVIEW}: a candidate of the case, a folder of frames or a solver; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="NAME|DIR", help=either)
     share(parser, "--unit")
-    again = f"for {PARAVIEW}: solve the reference again where its stored run has no states"
+    again = f"for {PARAVIEW}: solve the reference again if its stored run has no states"
     parser.add_argument("--solve", action="store_true", help=again)
     share(parser, "--ranks")
 

@@ -21,7 +21,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the known files, and print the missing ones, the cases that can be solved and the licence."""
+    """Write the known files, and print the missing files, the cases that can be solved and the licence."""
     wanted = fetching.known()
     found = fetching.fetch(options.sources, options.to, wanted)
     kept, made = (sorted({*files} - {*found}) for files in (wanted.published, wanted.made))

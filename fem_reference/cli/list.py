@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _data(case: Case) -> str | None:
-    """The reason why the data of a case is missing, "" where it is present; None for a case that needs none."""
+    """The reason why the data of a case is missing, "" if it is present; None for a case without data."""
     root = os.environ.get(DATA_SETTING)
     if not case.needed_data:
         return None

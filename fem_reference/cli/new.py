@@ -14,7 +14,7 @@ HELP = "write a scene to start from: a copy of a case, or one of your own muscle
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options that this verb has; it writes nothing into ``--out``."""
+    """Options of the verb; it writes nothing into ``--out``."""
     parser.set_defaults(writes=False)
     parser.add_argument("name", metavar="NAME", type=Path, help="the folder to create; its name is the scene's name")
     parser.add_argument("--from", dest="case", metavar="CASE", help="the case to copy (default: hip_flexion)")

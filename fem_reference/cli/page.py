@@ -7,20 +7,7 @@ from pathlib import Path
 from fem_reference import report
 from fem_reference.assessment import credibility
 from fem_reference.assessment.claims import Cover
-from fem_reference.cli import DONE, SOLVER_FAILED, out, write_output
-from fem_reference.cli._cases import (
-    case_part,
-    changes,
-    check_names,
-    checked_bench,
-    command_parts,
-    judged,
-    muscle_case,
-    own_candidates,
-    own_solver,
-    publish,
-    status,
-)
+from fem_reference.cli import DONE, SOLVER_FAILED, _cases, out, write_output
 from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import claims_page, credibility_page, estimation_page, field_page, ranking_page
@@ -71,15 +58,15 @@ def run(options: argparse.Namespace) -> int:
 
 def _examples(options: argparse.Namespace) -> int:
     cases = [casefile.read(name) for name in OCTAVE]
-    benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
+    benches = [_cases.checked_bench(case, options, _cases.own_candidates(case)) for case in cases]
     with fenicsx.shared():
-        results = tuple(judged(bench, options, own_candidates(bench.scene)) for bench in benches)
+        results = tuple(_cases.judged(bench, options, _cases.own_candidates(bench.scene)) for bench in benches)
     page = field_page.page("The report's Octave examples", results)
     path, lines = written(_asked([], options), page, out(options), options.page_name)
     facts = {"page": str(path), "cases": [report.summary(result) for result in results]}
     texts = [f"{result.scene.title}:\n{comparison_text(result)}" for result in results]
     write_output(facts, "\n\n".join([*texts, "\n".join(lines)]), options)
-    return status(results)
+    return _cases.status(results)
 
 
 def _table(options: argparse.Namespace) -> int:
@@ -87,17 +74,17 @@ def _table(options: argparse.Namespace) -> int:
     scenes = {scene.name: scene for scene in _scenes(options, table_5_1.SCENARIOS)}
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:
-        Bench(scenes[name], out(options)).setup()  # an error where a case that the user named lacks its data
-    own = own_solver(options)
+        Bench(scenes[name], out(options)).setup()  # an error if a case that the user named lacks its data
+    own = _cases.own_solver(options)
     for name in scenes if own else ():
         foreign.setdefault(name, []).extend(own)
-        check_names([one.name for one in foreign[name]])
+        _cases.check_names([one.name for one in foreign[name]])
     with fenicsx.shared():
         table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign, error_bars=options.error_bar)
     pairs = [(case, one) for case, found in foreign.items() for one in found if one not in own]
     more = [Part(("--candidate", f"{case}={one.settings['folder']}"), f"{case}={one.name}") for case, one in pairs]
-    asked = _asked(scenes.values(), options, [*more, *command_parts(own)])
-    publish(options, asked, ranking_page.page(table), ranking_page.facts(table), ranking_page.text(table))
+    asked = _asked(scenes.values(), options, [*more, *_cases.command_parts(own)])
+    _cases.publish(options, asked, ranking_page.page(table), ranking_page.facts(table), ranking_page.text(table))
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
 
 
@@ -109,7 +96,7 @@ def _claims(options: argparse.Namespace) -> int:
     printed = [f"{whole.count} error bars: {covered}"]
     printed += [f"left out: {case}: {why}" for case, why in found.missing.items()]
     asked = _asked(scenes, options)
-    publish(options, asked, claims_page.page(found), claims_page.facts(found), "\n".join(printed))
+    _cases.publish(options, asked, claims_page.page(found), claims_page.facts(found), "\n".join(printed))
     return SOLVER_FAILED if found.missing else DONE
 
 
@@ -123,12 +110,12 @@ def _estimation(options: argparse.Namespace) -> int:
     printed = [estimation_page.said(found), *(f"left out: {case}: {why}" for case, why in found.missing.items())]
     page = estimation_page.page(found)
     asked = _asked(scenes, options, [Part(("--solve",), "solved")] if options.solve else [])
-    publish(options, asked, page, estimation_page.facts(found), "\n".join(printed))
+    _cases.publish(options, asked, page, estimation_page.facts(found), "\n".join(printed))
     return DONE
 
 
 def _credibility(options: argparse.Namespace) -> int:
-    """Write the page of the evidence for each quantity, with moment arms where the anatomy is installed."""
+    """Write the page of the evidence for each quantity, with moment arms if the anatomy is installed."""
     with fenicsx.shared():
         arms, missing = moment_arms.beside(out(options) / "runs")
     entries = runner.entries().values()
@@ -139,7 +126,7 @@ def _credibility(options: argparse.Namespace) -> int:
     found = credibility.Credibility(rows, arms, missing, fits)
     printed = [credibility_page.said(found), *(f"left out: {case}: {why}" for case, why in missing.items())]
     page = credibility_page.page(found)
-    publish(options, _asked([], options), page, credibility_page.facts(found), "\n".join(printed))
+    _cases.publish(options, _asked([], options), page, credibility_page.facts(found), "\n".join(printed))
     return DONE
 
 
@@ -153,14 +140,14 @@ _PAGES: dict[str, tuple[tuple[str, ...], Callable[[argparse.Namespace], int]]] =
 
 
 def _scenes(options: argparse.Namespace, names: Iterable[str]) -> list[MuscleCase]:
-    """The cases that are asked for, else those of ``names``."""
-    return [muscle_case(name, options, quick=options.quick) for name in options.case or names]
+    """The requested cases, else the cases ``names``."""
+    return [_cases.muscle_case(name, options, quick=options.quick) for name in options.case or names]
 
 
 def _asked(scenes: Iterable[MuscleCase], options: argparse.Namespace, more: Iterable[Part] = ()) -> Asked:
-    cases = [Part(("--case", case_part(scene).words[0]), scene.name) for scene in scenes if options.case]
+    cases = [Part(("--case", _cases.case_part(scene).words[0]), scene.name) for scene in scenes if options.case]
     size = [Part(("--quick",), "quick")] if options.quick else []
-    return Asked("page", options.name, (Part((options.name,)), *cases, *size, *changes(options), *more))
+    return Asked("page", options.name, (Part((options.name,)), *cases, *size, *_cases.changes(options), *more))
 
 
 def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:
@@ -176,5 +163,5 @@ def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Ca
         if name not in cases:
             raise InputError("--candidate", f'"{case}"', f"one of {', '.join(cases)}")
         found.setdefault(name, []).append(recorded.choice(Path(folder), options.unit, "--candidate"))
-        check_names([candidate.name for candidate in found[name]])
+        _cases.check_names([candidate.name for candidate in found[name]])
     return found

@@ -26,7 +26,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Solve a case, and judge its expectations of the reference; for another solver, only those that need no reference."""
+    """Solve a case, and judge its expectations of the reference; for another solver, only expectations that need no reference."""
     scene = scene_of(options)
     if options.explain:
         found = [str(one) for one in scene.decisions or of_case.explained(scene)] or ["all effects act"]

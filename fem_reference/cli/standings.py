@@ -1,4 +1,4 @@
-"""The verb ``standings``: one page on which our solvers, other people's programs and submitted frames stand, over cases."""
+"""The verb ``standings``: our solvers, other people's programs and submitted frames over cases, on one page."""
 
 import argparse
 from pathlib import Path
@@ -14,7 +14,7 @@ from fem_reference.report.asked import Asked
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import standings
 
-HELP = "write the page on which our solvers and other people's stand, over cases; what did not change is not run again"
+HELP = "write the page of standings: our solvers and other people's, over cases; unchanged rows are not measured again"
 PAGE = "standings"
 
 
@@ -40,7 +40,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure what is new or changed, and write the page."""
+    """Measure new and changed rows, and write the page."""
     limit = _time(options.time_limit)
     only = {state for state in options.only.split(",") if state}
     if not only <= {*STATES}:

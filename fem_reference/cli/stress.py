@@ -1,4 +1,4 @@
-"""The verb ``stress``: every solver on hard cases, and whether it stays stable."""
+"""The verb ``stress``: the stability of every solver on hard cases."""
 
 import argparse
 from collections.abc import Collection

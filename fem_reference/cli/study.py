@@ -30,7 +30,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure the cost of accuracy on cases; write a page for each case and, where there are several, one for all."""
+    """Measure the cost of accuracy on cases; write a page for each case and, for several cases, a common page."""
     given = dict(map(casefile.setting, options.set))
     scenes = [casefile.read_muscle(case, given) for case in options.cases]
     own = own_solver(options, [one for scene in scenes for one in scene.candidate])

@@ -1,4 +1,4 @@
-"""The verb ``uncertainty``: the band of answers that the unknown parameters of a case allow."""
+"""The verb ``uncertainty``: the band of results for the unknown parameters of a case."""
 
 import argparse
 

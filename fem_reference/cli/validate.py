@@ -16,13 +16,13 @@ HELP = "make all checks of a case that are possible before it is solved, and est
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options that this verb has; it writes nothing into ``--out``."""
+    """Options of the verb; it writes nothing into ``--out``."""
     parser.set_defaults(writes=False)
     share(parser, "case", "--set")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read, set up and mesh a case, check the settings of every solver that it chooses, and print the facts."""
+    """Read, set up and mesh a case, check the settings of its solvers, and print the facts."""
     scene = scene_of(options)
     if scene.negative_control is not None and scene.from_file:
         casefile.read(options.case, with_negative_control=True)

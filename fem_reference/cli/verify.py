@@ -26,7 +26,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure problems whose answers are known: all, or those that are named."""
+    """Measure all problems with known answers, or the named ones."""
     from fem_reference.verification.lab import lab  # loads the solvers
 
     catalogue = runner.entries()

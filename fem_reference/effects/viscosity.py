@@ -1,6 +1,6 @@
 """Viscosity of the matrix, in parallel with its elastic law (Kelvin and Voigt).
 
-With it, short waves of an unstable state grow no faster than long ones.
+With viscosity, short waves of an unstable state grow no faster than long waves.
 """
 
 from typing import Any, ClassVar

@@ -46,10 +46,8 @@ def check(case: MuscleCase) -> None:
             want = f"what FEBio has in the same form: {', '.join(name_of(kind) for kind in SAME)}"
             raise InputError(join(case.place, f"effect[{i}]"), f'"{name_of(effect)}"', want)
     if len({(one.c4, one.linear_from) for one in case.effects if isinstance(one, FibrePassiveFebio)}) > 1:
-        got, want = (
-            "fibre_passive_febio of different c4 or linear_from",
-            "the same in all regions, as FEBio has one law",
-        )
+        got = "fibre_passive_febio of different c4 or linear_from"
+        want = "the same in all regions, as FEBio has one law"
         raise InputError(join(case.place, "effect"), got, want)
     matrix = (NeoHooke, MooneyRivlin), "no matrix: neither neo_hooke nor mooney_rivlin"
     volume = (Incompressible, IncompressiblePenalty), "neither incompressible nor incompressible_penalty"

@@ -79,9 +79,7 @@ def _renamed(root: Element, name: str, before: dict[str, int]) -> None:
 
 
 def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
-    """Add contact between each two muscles that may touch: in two passes, each with half the stiffness, as in the reference each
-    side has half of the stiffness.
-    """
+    """Add contact between each two muscles that may touch, in two passes with half the stiffness, as each side in the reference."""
     if not problem.pairs:
         return
     assert problem.law is not None  # as muscles touch only by a law

@@ -35,12 +35,12 @@ def new_folder(folder: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(part, ignore_errors=True)
         for parent in above:
-            with suppress(OSError):  # the folder is not empty, as after success
+            with suppress(OSError):  # the folder is not empty
                 parent.rmdir()
 
 
 def write_text(path: Path, case: Case, file: str | None = None, **values: str) -> None:
-    """Write the template ``file``, by default the one named as ``path``, filled with facts of the ``case`` and ``values``."""
+    """Write the template ``file``, by default with the name of ``path``, filled with facts of the ``case`` and ``values``."""
     template = Template((Path(__file__).parent / (file or path.name)).read_text(encoding="utf-8"))
     known = {
         "title": case.title,

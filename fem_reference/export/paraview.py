@@ -73,9 +73,8 @@ class _Frames:
         self.results, self.within = _states(comparison), None
         if self.results is not None:
             found = embed(self.results.mesh, self.setup.surface.points)
-            inside = np.clip(
-                found.barycentric, 0, None
-            )  # a vertex outside the tetrahedra gets the values at their boundary
+            # A vertex outside the tetrahedra gets the values at their boundary.
+            inside = np.clip(found.barycentric, 0, None)
             self.within = found.tets, inside / inside.sum(axis=1, keepdims=True)
         self.arrays = {run.name: dict(self._of_surface(run)) for run in comparison.runs}
         self.fibres = {run.name: fibre_points(run, self.context) for run in comparison.runs}
@@ -89,9 +88,8 @@ class _Frames:
             yield "distance_to_bones", gaps
         if run is self.reference:
             pressed = contact.among(self.case.effects) is not None and in_situ.among(self.case.effects) is None
-            if (
-                gaps is not None and pressed
-            ):  # in situ the pressure depends on gaps at rest, which only the solver knows
+            # In situ the pressure depends on gaps at rest, which only the solver knows.
+            if gaps is not None and pressed:
                 yield "contact_pressure", self._contact_pressure()
             return
         yield "distance_to_reference", local_fields.to_same_vertex(run, self.reference)
@@ -155,9 +153,7 @@ class _Frames:
 
 
 def interior(made: Results, frame: float) -> DataBlock:
-    """The tetrahedra of a reference; results that jump between tetrahedra are given at their middles, the least det F at their
-    corners.
-    """
+    """The tetrahedra of a reference; results that jump between them are given at the middles, the least det F at the corners."""
     mesh, count = made.mesh, len(made.mesh.tets)
     cells = made.evaluate_in(np.arange(count), np.full((count, 4), 0.25), frame, _names(made, frame))
     middles = mesh.points[mesh.tets].mean(axis=1)

@@ -39,9 +39,7 @@ class Shape(Protocol):
         """The present vector area (3,) [mm2] of a region, outward, and its moment (3,) [mm3] about the origin; None if unknown."""
 
     def motion(self) -> tuple[Floats, Floats] | None:
-        """The integral of the velocity (3,) [mm4/s] over the volume at rest, and its moment (3,) [mm5/s] about the origin; None
-        where unknown.
-        """
+        """The integral of the velocity (3,) [mm4/s] over the rest volume and its moment (3,) [mm5/s]; None if unknown."""
 
 
 def dead(density: ArrayLike, shape: Shape, on: str | None = None) -> Wrench:

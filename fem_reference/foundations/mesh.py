@@ -4,7 +4,7 @@ Shapes of arrays: points ``(n, 3)`` [mm], triangles ``(m, 3)`` and tets ``(k, 4)
 """
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -136,6 +136,13 @@ def boundary(tets: Ints) -> tuple[Ints, Ints]:
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     alone = np.sort(first[count == 1])
     return faces[alone], alone // 4
+
+
+def united(parts: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
+    """The points (n, d) and cells (m, k) of all ``parts``, part after part, whose cells count the points of their own part."""
+    starts = np.cumsum([0, *(len(points) for points, _ in parts)])
+    cells = [own + start for (_, own), start in zip(parts, starts, strict=False)]
+    return np.concatenate([points for points, _ in parts]), np.concatenate(cells)
 
 
 def check_finite(surface: Surface) -> None:

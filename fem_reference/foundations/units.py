@@ -5,12 +5,14 @@ Scene records consist of the annotated types: a field of type ``Pressure`` takes
 
 import math
 import re
+import tomllib
 from collections.abc import Sequence
 from functools import cache, partial
 from numbers import Real
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, TypeAdapter
 
 # The allowed units [mm] of coordinates in a file: in scenes, beside frames and on the command line. Quantities with a number may
 # have any unit of their kind; for coordinates a slip such as "Mm", 1e9 mm, would not be noticed.
@@ -28,49 +30,11 @@ class Kind(NamedTuple):
     written: tuple[str, ...] = ()
 
 
-# By name. The greatest length is a thousand kilometres, the greatest pressure ten times the stiffness of diamond.
-KINDS = {
-    "a length": Kind("mm", ('"2 mm"', '"146, 238, -431 mm"'), 1e9),
-    "an angle": Kind("rad", ('"30 deg"', '"0, 0, 30 deg"'), 1e6),
-    "a pressure": Kind("MPa", ('"30 kPa"', '"0, 6.25, 0 kPa"'), 1e7),
-    "a fraction": Kind("", ('"0.5 %"',), 1e6, ("", "%", "percent")),
-    "a number": Kind("", ('"0.5"',), written=("",)),
-    "a time": Kind("s", ('"0.01 s"',)),
-    "a volume": Kind("mm^3", ('"3 ml"',)),
-    "a density": Kind("tonne/mm^3", ('"1060 kg/m3"',)),
-    "an acceleration": Kind("mm/s^2", ('"9.81 m/s^2"', '"0, 0, -9.81 m/s^2"')),
-    "a stiffness per area": Kind("MPa/mm", ('"100 kPa/mm"',)),
-    "a damping per volume": Kind("MPa*s/mm^2", ('"1 Pa s/mm^2"',)),
-    "a viscosity": Kind("MPa*s", ('"300 kPa s"',)),
-    "a force": Kind("N", ('"800 N"',)),
-    "a stiffness": Kind("N/mm", ('"200 N/m"',)),
-    "a damping": Kind("N*s/mm", ('"0.1 N s/m"',)),
-    "a moment": Kind("N*mm", ('"3 N m"',)),
-    "a bending stiffness": Kind("N*mm", ('"0.3 N mm"',)),
-    "a rate": Kind("1/s", ('"5 1/s"',)),
-}
-# Common units, by unit and internal unit, with the factors of pint, whose import takes 0.4 s.
-COMMON = {
-    ("cm", "mm"): 10.0,
-    ("m", "mm"): 1000.0,
-    ("deg", "rad"): math.pi / 180,
-    ("Pa", "MPa"): 1e-6,
-    ("kPa", "MPa"): 1e-3,
-    ("GPa", "MPa"): 1000.0,
-    ("%", ""): 0.01,
-    ("ms", "s"): 1e-3,
-    ("kg/m^3", "tonne/mm^3"): 1.0000000000000002e-12,
-    ("m/s^2", "mm/s^2"): 1000.0,
-    ("Pa/mm", "MPa/mm"): 1e-6,
-    ("kPa/mm", "MPa/mm"): 1e-3,
-    ("mPa s/mm^2", "MPa*s/mm^2"): 1e-9,
-    ("Pa s/mm^2", "MPa*s/mm^2"): 1e-6,
-    ("Pa s", "MPa*s"): 1e-6,
-    ("kPa s", "MPa*s"): 1e-3,
-    ("N/m", "N/mm"): 1e-3,
-    ("N s/m", "N*s/mm"): 1e-3,
-    ("N mm", "N*mm"): 1.0,
-    ("N m", "N*mm"): 1000.0,
+_FILE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+# The kinds by name, and the number of internal units in a common unit, by that and the internal one.
+KINDS = TypeAdapter(dict[str, Kind]).validate_python(_FILE["kind"])
+COMMON: dict[tuple[str, str], float] = {
+    (unit, inside): factor for inside, units in _FILE["common"].items() for unit, factor in units.items()
 }
 # A number, then possibly a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
@@ -204,7 +168,7 @@ def field_unit(field: Any) -> str:
 
 
 def kinds(annotation: Any) -> list[Any]:
-    """A type and all types that it is made of."""
+    """A type and all types in it."""
     return [annotation, *(kind for part in getattr(annotation, "__args__", ()) for kind in kinds(part))]
 
 

@@ -8,7 +8,7 @@ __version__ = "0.1.0"
 
 
 def versions(packages: Iterable[str]) -> dict[str, str]:
-    """The versions of the installed ones among ``packages``."""
+    """The versions of all installed ``packages``."""
     found = dict[str, str]()
     for package in packages:
         with suppress(importlib.metadata.PackageNotFoundError):

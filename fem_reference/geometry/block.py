@@ -19,7 +19,7 @@ _SAME = 1e-6  # tolerance relative to the largest edge: the precision of single-
 def fill(surface: Surface, size: float) -> TetMesh:
     """The axis-aligned box with the closed outward ``surface``, as a grid of boxes with edges of about ``size`` [mm].
 
-    InputError if it is not the surface of such a box, or where ``size`` is far too small or too large.
+    InputError if it is not the surface of such a box, or if ``size`` is far too small or too large.
     """
     low, high = _extent(surface)
     check_size(surface, size)

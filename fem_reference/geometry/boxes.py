@@ -52,13 +52,13 @@ def around(points: Floats, reach: Floats) -> Boxes:
 
 
 def touching(one: Boxes, other: Boxes) -> tuple[Ints, Ints]:
-    """The indices (k,) and (l,) of the boxes of each set that may touch a box of the other: all that do, and few that do not."""
+    """The indices (k,) and (l,) of the boxes of each set that may touch a box of the other: all that touch, and few others."""
     others = reached(one, other)
     return _near(other, others, one), others
 
 
 def reached(one: Boxes, other: Boxes) -> Ints:
-    """The indices (k,) of the boxes of ``other`` that may touch a box of ``one``: all that do, and few that do not."""
+    """The indices (k,) of the boxes of ``other`` that may touch a box of ``one``: all that touch, and few others."""
     return _near(one, np.arange(one.low.shape[1]), other)
 
 

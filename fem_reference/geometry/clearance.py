@@ -24,7 +24,7 @@ class Clearance:
     spacing: float
 
     def __call__(self, points: Floats) -> Floats:
-        """A lower bound (n,) of the clearance [mm] of ``points`` (n, 3), 0 or below where none is certain; NaN for NaN."""
+        """A lower bound (n,) of the clearance [mm] of ``points`` (n, 3), 0 or below if no clearance is certain; NaN for NaN."""
         at = (points - self.origin) / self.spacing
         known = np.isfinite(at).all(axis=1)
         at = np.where(known[:, None], at, 0.0)
@@ -51,9 +51,9 @@ def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float
 
 
 def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
-    """Mask of the cells, three fewer along each axis, in which a spline may be at ``level`` or below. In a cell it is no lower than
-    the least of the 64 coefficients there, nor than the least of its Bernstein coefficients. It is no higher than the greatest
-    coefficient, so that cells deep inside need no check.
+    """Mask of the cells, three fewer along each axis, in which a spline may be at ``level`` or below. In a cell the spline is at
+    least the least of its 64 coefficients and of its Bernstein coefficients. It is at most the greatest coefficient, so cells deep
+    inside need no check.
     """
     found = _least_of_four(coefficients) <= level
     cells = np.argwhere(found & (-_least_of_four(-coefficients) > level))

@@ -10,10 +10,11 @@ from fem_reference.geometry.edges import Edges
 
 # Chosen by trials on four hip muscles and a box; more rounds improve nothing.
 _ROUNDS = 6
-# A vertex may move along a direction if the squares of the normals around it have less than this share along it: the vertex then
-# stays on its plane or sharp edge. Above 0.05 a thin rim shrinks, below 0.02 slivers remain.
+# A vertex may move along a direction if the squares of the normals around the vertex have less than this share in this direction:
+# the vertex then stays on its plane or sharp edge. Above 0.05 a thin rim shrinks, below 0.02 slivers remain.
 _FREE = 0.03
-# Distance of the pole of inversion in diagonals of the body. A nearer pole moves sharp edges, a farther one leaves flat parts flat.
+# Distance of the pole of inversion in diagonals of the body. A nearer pole moves sharp edges, a farther pole leaves flat parts
+# flat.
 _POLE = 6.0
 _NEARLY_FLAT = np.cos(np.radians(30))
 _TINY = np.finfo(float).tiny
@@ -34,8 +35,8 @@ def coarsen(surface: Surface, count: int) -> Surface:
 
 
 def resampled(surface: Surface, power: int) -> Surface:
-    """``surface`` with ``4**power`` times as many triangles. For positive ``power`` each triangle is cut into four, repeatedly,
-    which moves nothing and keeps its vertices first; else it is coarsened.
+    """``surface`` with ``4**power`` times as many triangles. For positive ``power`` each triangle is cut into four, repeatedly; no
+    vertex moves, and old vertices come first. Otherwise the surface is coarsened.
     """
     if power < 0:
         return coarsen(surface, max(4, round(len(surface.triangles) * 4**power)))
@@ -55,7 +56,7 @@ def _collapse(surface: Surface, count: int) -> tuple[Floats, Ints]:
 
 
 def _invert(points: Floats, pole: Floats, radius: float) -> Floats:
-    """``points`` (n, 3) inverted in the sphere of ``radius`` about ``pole``; its own inverse."""
+    """``points`` (n, 3) inverted in the sphere of ``radius`` about ``pole``; a second inversion restores them."""
     away = points - pole
     return np.asarray(pole + away * radius**2 / np.sum(away**2, axis=1, keepdims=True))
 
@@ -81,7 +82,7 @@ def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> F
 
 
 def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
-    """The sums (n, 3, 3) over the triangles around each point of their angle at it times ``n n^T``, with their unit normal n."""
+    """For each point, the sum (n, 3, 3) over the triangles around it of angle times ``n n^T``, with the unit normal n."""
     across = unit_normals(points[triangles])
     squares = across[:, :, None] * across[:, None, :]
     tensors = np.zeros((len(points), 3, 3))

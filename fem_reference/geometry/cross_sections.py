@@ -1,6 +1,6 @@
 """Sections of a muscle on which a field has a given value (isosurfaces), as triangles, each mapped to the unit square.
 
-Rims of consecutive sections are matched point by point, so that a changing outline does not turn lines along the muscle.
+Rims of consecutive sections are matched point by point, so a changing outline does not turn lines along the muscle.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,9 @@ _SQUARE = ((1, 1, 0, 0, 1, 1), (0.5, 1, 1, 0, 0, 0.5))
 _SAMPLES = 360  # points on each rim that are matched
 _REACH = 60  # samples by which a match may deviate from the common shift of the rim, either way
 _STEPS = (-1, 0, 1, 2, 3)  # samples by which consecutive matches may differ, so that matches stay in order
-_STIFFNESS = 0.01  # share of a rim's length: stretching a rim to twice its length costs as much as points that lie this far apart
+_STIFFNESS = (
+    0.01  # share of a rim's length: the distance of points that costs as much as stretching a rim to twice its length
+)
 _WINDOW = 9  # samples in the moving mean that smooths the matches
 _LEAST = 0.1  # weight of the common shift in a match, so that no two points coincide
 
@@ -54,7 +56,7 @@ class CrossSection:
         """The position (k,) of each point of the rim around the unit square, in turns from the middle of the square's side x = 1;
         ``first`` (3,) is the direction of its first side.
 
-        It is a share of length after a stretch that makes the section as wide as high, so that a rectangle is mapped linearly.
+        It is a share of length after a stretch that makes the section as wide as high, so a rectangle is mapped linearly.
         """
         centre, product = self.moments
         axes = np.stack([first, np.cross(self.normal, first)])
@@ -80,8 +82,8 @@ def _around(loop: Floats) -> Floats:
 
 
 def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection | None:
-    """The largest piece of the section of a ``mesh`` on which the field of ``values`` (n,) at its points is ``level``; None if it
-    has holes or there is none. Its normal points towards greater values.
+    """The largest piece of the section of a ``mesh`` on which the field of ``values`` (n,) at its points is ``level``; None if the
+    piece has holes or does not exist. Its normal points towards greater values.
     """
     above = values - level
     above = np.where(np.abs(above) < _NUDGE, _NUDGE, above)
@@ -128,9 +130,10 @@ def _greatest(points: Floats, triangles: Ints) -> CrossSection | None:
 
 
 def carried(known: CrossSection, turns: Floats, other: CrossSection) -> Floats:
-    """The positions (m,) of the ``other`` section's rim along the unit square, from those, ``turns`` (n,), of the ``known`` one's.
+    """The positions (m,) of the rim of the ``other`` section along the unit square, from the positions ``turns`` (n,) of the
+    ``known`` rim.
 
-    The points of the other rim are matched in order with points of the known one, so that the mean square of their distance across
+    The points of the other rim are matched in order with points of the known rim, so that the mean square of their distance across
     the muscle plus a cost of stretch is least.
     """
     normal = known.normal + other.normal

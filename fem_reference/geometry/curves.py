@@ -1,8 +1,8 @@
 """Curves through a few points: the estimation techniques of the report's sections 3.1 to 3.5, for fibres and outlines.
 
 A curve is a callable from parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two formulas of the report
-have misprints: the second row of the Bezier matrix (3.1) is -3, 3, 0, 0; and the matrix (3.2) is that of the uniform spline, not of
-the centripetal one: the exponent of its knots and the tension of (3.3) are different parameters.
+have misprints: the second row of the Bezier matrix (3.1) is -3, 3, 0, 0; and (3.2) is the matrix of the uniform spline, not of the
+centripetal spline: the exponent of its knots and the tension of (3.3) are different parameters.
 """
 
 from collections.abc import Callable
@@ -49,7 +49,7 @@ def bezier(points: Floats) -> Curve:
 def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
     """The Catmull-Rom spline through ``points`` (n, d). ``exponent``: 0 uniform (3.2), 0.5 centripetal, 1 chordal.
 
-    Its tangents are those of the parabola through a point and its two neighbours (Barry and Goldman 1988,
+    Its tangents are the tangents of the parabola through a point and its two neighbours (Barry and Goldman 1988,
     doi 10.1145/378456.378511). At an end the end point itself replaces the missing neighbour (report 3.3), which gives half the
     slope of the chord.
     """
@@ -66,7 +66,7 @@ def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
 def fourier(points: Floats) -> Curve:
     """The discrete Fourier series of ``points`` (n, d), taken as equidistant, and as periodic up to their chord (3.4, 3.5).
 
-    The chord, the straight line between both ends, is subtracted first and the rest extended as an odd function, so that the
+    The chord, the straight line between both ends, is subtracted first and the remainder extended as an odd function, so that the
     curve passes through the ends.
     """
     count = len(knots(points)) - 1

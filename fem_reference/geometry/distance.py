@@ -12,7 +12,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal, norm
 
 # The distance of a sample point just outside a triangle, as a share of the surface's diagonal.
 _STEP = 1e-5
-# The number of triangles within another part whose depth is measured: those farthest from the uncovered triangles.
+# The number of triangles within another part whose depth is measured: the triangles farthest from the uncovered triangles.
 _WITHIN = 16
 
 
@@ -29,7 +29,7 @@ class Distances(NamedTuple):
 
 
 def distances(points: Floats, surface: Surface) -> Distances:
-    """The closest point of ``surface`` for each of ``points`` (n, 3) [mm]; ValueError if one is not finite."""
+    """The closest point of ``surface`` for each of ``points`` (n, 3) [mm]; ValueError if a point is not finite."""
     points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
     for what, given in (("points", points), ("points of the surface", surface.points)):
         if not np.isfinite(given).all():  # libigl would give triangles that do not exist
@@ -85,7 +85,7 @@ def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
 
 def flattened(surface: Surface, place: Floats) -> float:
     """The error of a flat triangle on a curved surface times the radius of curvature [mm2]: its middle's distance from a sphere
-    through its corners, times the radius of the sphere. The triangle is the one nearest to a ``place`` (3,) [mm].
+    through its corners, times the radius of the sphere. The triangle is the nearest to a ``place`` (3,) [mm].
     """
     corners = surface.points[surface.triangles[distances(place[None], surface).triangle[0]]]
     return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6
@@ -94,7 +94,7 @@ def flattened(surface: Surface, place: Floats) -> float:
 @np.errstate(over="ignore", invalid="ignore")
 def outer_windings(surface: Surface) -> Floats:
     """The winding number (m,) of the surface at a point just outside each triangle: 0 on the skin of a valid body, positive inside
-    another part of the body, negative where the triangle faces a part that is inside out; NaN if a triangle has no normal.
+    another part of the body, negative if the triangle faces a part that is inside out; NaN if a triangle has no normal.
 
     "Just outside" is 1e-5 of the surface's diagonal away; thinner folds are not distinguished. Winding numbers by Barill et al.
     2018, doi 10.1145/3197517.3201337, differ by a few thousandths from the whole numbers to which they are rounded.
@@ -130,7 +130,9 @@ def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
 
 
 def farthest_points(points: Floats, count: int) -> Ints:
-    """The indices (count,) of ``points`` (n, d): first the farthest from their mean, then always the farthest from those chosen."""
+    """The indices (count,) of ``points`` (n, d): first the farthest from their mean, then always the farthest from the chosen
+    points.
+    """
     chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     away = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):

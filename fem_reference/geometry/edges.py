@@ -20,7 +20,7 @@ class Edges:
 
     @classmethod
     def of(cls, surface: Surface) -> "Edges":
-        """The edges of a closed, consistently oriented surface at rest; their areas sum to that of the surface."""
+        """The edges of a closed, consistently oriented surface at rest; their areas sum to the area of the surface."""
         triangles = surface.triangles
         ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
         sides = twins(triangles)
@@ -34,11 +34,11 @@ class Edges:
 
     @np.errstate(over="ignore", invalid="ignore")
     def angles(self, points: Floats) -> Floats:
-        """Angle (e,) [rad] from the normal of the left triangle to that of the right, in (-pi, pi].
+        """Angle (e,) [rad] from the normal of the left triangle to the normal of the right, in (-pi, pi].
 
-        0 where the two are flat, pi / 2 at the edges of a box, below 0 where the surface is hollow; NaN if a triangle
-        has no normal. It is atan2((n x m) . d, n . m) of the unit normals n, m and the direction d of the edge:
-        report eq. 5.23 without its arccos, which loses the sign and, for small angles, the digits.
+        0 if the two are flat, pi / 2 at the edges of a box, below 0 if the surface is hollow; NaN if a triangle has no normal. It
+        is atan2((n x m) . d, n . m) of the unit normals n, m and the direction d of the edge: report eq. 5.23 without its arccos,
+        which loses the sign and, for small angles, the digits.
         """
         start, end = (points[corner] for corner in self.ends.T)
         along = end - start
@@ -49,6 +49,6 @@ class Edges:
 
 
 def _unit(vectors: Floats) -> Floats:
-    """Vectors (e, 3) of length 1; NaN for one whose length is zero or not finite."""
+    """Vectors (e, 3) of length 1; NaN for a vector whose length is zero or not finite."""
     lengths = np.linalg.norm(vectors, axis=1)
     return np.asarray(vectors / np.where(np.isfinite(lengths), lengths, np.nan)[:, None])

@@ -8,9 +8,9 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, diagonal, edge_vectors
 from fem_reference.geometry.distance import Distances, distances
 
-# A point that round-off leaves between two tets is searched again this far away, as a share of the mesh's diagonal.
+# A point that rounding leaves between two tets is searched again at this distance, as a share of the mesh's diagonal.
 _NUDGE = 1e-9
-# A closest point whose weight for a corner is below this lies on the opposite edge, or at a corner.
+# A closest point whose weight for a corner is below this counts as on the opposite edge, or at a corner.
 _TIE = 1e-9
 
 
@@ -18,8 +18,8 @@ _TIE = 1e-9
 class Embedding:
     """The tet of each of n points, its barycentric coordinates there, and its distance outside the mesh.
 
-    ``tets`` (n,), ``barycentric`` (n, 4), ``outside`` (n,) [mm], 0 inside. For a point outside, the tet is the one
-    behind the closest boundary triangle, and the coordinates extrapolate (some are negative).
+    ``tets`` (n,), ``barycentric`` (n, 4), ``outside`` (n,) [mm], 0 inside. For a point outside, the tet is behind the closest
+    boundary triangle, and the coordinates extrapolate (some are negative).
     """
 
     tets: Ints
@@ -57,7 +57,7 @@ class Locator:
         return Embedding(tets, barycentric(points, self.mesh.points[self.mesh.tets[tets]]), outside)
 
     def _first_of_ties(self, skin: Distances) -> Ints:
-        """The closest boundary triangles (n,); at an edge or corner the first of them, so that round-off does not decide."""
+        """The closest boundary triangles (n,); at an edge or corner the first of them, so that rounding does not decide."""
         chosen = np.array(skin.triangle)
         for i in np.flatnonzero((skin.barycentric < _TIE).any(axis=1)):
             shared = self.faces[chosen[i]][skin.barycentric[i] >= _TIE]

@@ -21,8 +21,8 @@ _INWARD = 1e-3
 
 class Corners(NamedTuple):
     """The distinct corners (k,) of the pieces of a surface: the matrix ``carried`` (k, n) from positions of the vertices to
-    theirs, the distances ``away`` (k,) [mm] from the attached part, 0 on it, and the index ``by`` (k,) of that attachment; the
-    corners ``at`` (p, 3) of each piece, and the corner at each of the ``vertices`` (n,).
+    positions of the corners, the distances ``away`` (k,) [mm] from the attached part, 0 on it, and the index ``by`` (k,) of that
+    attachment; the corners ``at`` (p, 3) of each piece, and the corner at each of the ``vertices`` (n,).
     """
 
     carried: csr_array
@@ -37,8 +37,8 @@ class Exemption:
     """The part of a ``surface`` that is exempt from contact: the attached ``part`` (r, 3, 3), as triangles, each with the
     index ``by`` (r,) of its attachment, to bones of these ``names``; and the surface within ``reach`` [mm] of it on the same side.
 
-    The reach is the ``spacing`` of the contact points: the area of a point closer to the attached part would include attached
-    area. It depends on the size of the surface and not on its triangles.
+    The reach is the ``spacing`` of the contact points: the area around a point closer to the attached part would include attached
+    area. The reach depends on the size of the surface and not on its triangles.
     """
 
     surface: Surface
@@ -60,8 +60,8 @@ class Exemption:
         return cls(surface, corners[np.concatenate([np.zeros(0, np.int64), *some])], by, names, spacing(surface))
 
     def away(self, triangles: Ints, points: Floats) -> tuple[Floats, Ints]:
-        """Distances (k,) [mm] of ``points`` (k, 3) of the ``triangles`` (k,) from the attached part, infinite if that part
-        faces away, and the index (k,) of its attachment.
+        """Distances (k,) [mm] of ``points`` (k, 3) of the ``triangles`` (k,) from the attached part, infinite if the part faces
+        away, and the index (k,) of its attachment.
         """
         if len(self.part) == 0:
             return np.full(len(points), np.inf), np.full(len(points), -1)
@@ -73,7 +73,7 @@ class Exemption:
 
     @cached_property
     def pieces(self) -> Pieces:
-        """The whole surface, cut into pieces of the spacing of contact points."""
+        """The entire surface, cut into pieces of the spacing of contact points."""
         return cut(self.surface, np.arange(len(self.surface.triangles)), self.reach)
 
     @cached_property
@@ -99,7 +99,7 @@ class Exemption:
 
     @property
     def vertices(self) -> NDArray[np.bool_]:
-        """Mask (n,) of the exempt vertices: those exempt in any triangle around them."""
+        """Mask (n,) of the vertices that are exempt in any triangle around them."""
         return np.asarray(self.corners.away[self.corners.vertices] <= self.reach)
 
     @cached_property
@@ -108,7 +108,9 @@ class Exemption:
         return np.asarray(self.away(self.pieces.parents, self._places.mean(axis=1))[0] > self.reach)
 
     def places(self, count: int) -> csr_array:
-        """About ``count`` evenly chosen points that can be in contact, as the matrix from positions of the vertices to theirs."""
+        """About ``count`` evenly chosen points that can be in contact, as the matrix from positions of the vertices to positions of
+        the points.
+        """
         felt = np.flatnonzero(self.corners.away > self.reach)
         return self.corners.carried[felt[:: max(1, len(felt) // count)]]
 

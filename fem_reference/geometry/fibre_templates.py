@@ -1,8 +1,9 @@
 """Fibres of a template in the unit cube, mapped to sections of a muscle: the decomposition of Kohout and Kukacka (report 6.1.2).
 
 Their method uses isocontours on the surface. Here each contour is the rim of a section of the Laplace field in tetrahedra, and a
-harmonic map of that section gives the points inside. These are in the muscle; between sections, lines may leave it where it bends.
-A muscle with several heads is followed along its largest section only; where it gains or loses a head, lines are twisted.
+harmonic map of that section gives the points inside. These points are in the muscle; between sections, lines may leave the muscle
+where it bends. A muscle with several heads is followed along its largest section only; where it gains or loses a head, lines are
+twisted.
 """
 
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from fem_reference.geometry.radial_basis import halton
 PLACE = "fibres.kohout_kukacka"
 _WINDOW = 7  # points of a line through which smoothing fits a parabola
 _FLAT = 1e-9  # twice the area of a triangle in the unit square below which its corners count as collinear
-_SHORTEST = 0.1  # least length of a pennate fibre, as a share of the extent of the longest along the muscle
+_SHORTEST = 0.1  # least length of a pennate fibre, as a share of the extent of the longest fibre along the muscle
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +66,7 @@ def contours(field: FibreField, count: int, towards: Floats | None = None) -> Co
     """``count`` sections between the attachments, with about equal volumes between them; a section with holes is left out.
 
     The first side of the middle section's square is along ``towards`` (3,) or, if None, along its longest axis; the squares of the
-    others follow from section to section by the nearest points of their rims.
+    other sections follow from section to section by the nearest points of their rims.
     """
     means = field.values[field.mesh.tets].mean(axis=1)
     levels = np.quantile(means, (np.arange(count) + 0.5) / count)

@@ -20,7 +20,7 @@ POINTS = 40  # of each line
 _NEAR = 1e-3  # a line has arrived where the field is this close to 0 or 1
 # Seeds whose relative difference is below this are ordered by their index, so that a rotated mesh gives the same lines.
 _TIES = 1e-6
-_HALFWAY = 0.5 - _TIES  # a field value of 1/2 up to round-off is above it
+_HALFWAY = 0.5 - _TIES  # a field value of 1/2 up to rounding counts as above it
 
 Bools = NDArray[np.bool_]
 # From cells (n,) and rest points (n, 3) in them to unit vectors (n, 3); picklable.
@@ -77,7 +77,7 @@ class FibreField:
 
 def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
     """A Laplace field in the tetrahedra of a muscle, by linear elements: 0 on the facets ``start`` of the ``mesh``, 1 on ``end``,
-    without flux elsewhere; 1/2 where the two touch, as they may on a coarse mesh.
+    without flux elsewhere; 1/2 where the two touch, which is possible on a coarse mesh.
     """
     zeros, ones = np.unique(mesh.facets[start]), np.unique(mesh.facets[end])
     values = np.zeros(len(mesh.points))
@@ -109,7 +109,7 @@ def trace(field: FibreField, count: int) -> Polylines:
 
 @dataclass(frozen=True, eq=False)
 class NearestLine:
-    """Fibre directions: at a point that of the segment of ``lines`` whose middle is nearest."""
+    """Fibre directions: at each point the direction of the segment of ``lines`` whose middle is nearest."""
 
     lines: Polylines
 
@@ -153,7 +153,7 @@ def _slopes(mesh: TetMesh, values: Floats) -> Floats:
 
 
 def averaged(mesh: TetMesh, slopes: Floats) -> Floats:
-    """Vectors (n, 3) at the points of a ``mesh``: those of the tets around each, ``slopes`` (k, 3), averaged by volume."""
+    """Vectors (n, 3) at the points of a ``mesh``: vectors ``slopes`` (k, 3) of the tets around each point, averaged by volume."""
     volumes = np.repeat(tet_volumes(mesh.points, mesh.tets), 4)
     share = np.bincount(mesh.tets.ravel(), weights=volumes, minlength=len(mesh.points))
     weighted = (volumes * np.repeat(slope, 4) for slope in slopes.T)
@@ -179,7 +179,7 @@ def _seeds(field: FibreField) -> Floats:
 
 
 def spread(points: Floats, count: int) -> Floats:
-    """At most ``count`` of ``points`` (k, d), first the most central, then always the farthest from those chosen."""
+    """At most ``count`` of ``points`` (k, d), first the most central, then always the farthest from the chosen points."""
     chosen = [_first_best(-np.linalg.norm(points - points.mean(axis=0), axis=1))]
     distances = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):
@@ -189,7 +189,7 @@ def spread(points: Floats, count: int) -> Floats:
 
 
 def _first_best(scores: Floats) -> int:
-    """The first index whose score is the greatest up to round-off."""
+    """The first index whose score is the greatest up to rounding."""
     return int(np.argmax(scores >= scores.max() - _TIES * np.abs(scores).max()))
 
 

@@ -59,7 +59,7 @@ class FieldMesh:
 
 
 POINTS = 5  # of the quadrature rules along each direction: exact up to degree 9
-# The largest coordinate that is allowed, so that areas and results computed from it are finite.
+# The largest allowed coordinate, so that areas and results computed from it are finite.
 FURTHEST = 1e50
 
 
@@ -98,7 +98,8 @@ def share_above(mesh: FieldMesh, level: float) -> Floats:
     """The share (m,) of each triangle's area with y above ``level``."""
     heights = np.sort(mesh.points[mesh.cells][:, :, 1] - level, axis=1)
     low, middle, high = heights.T
-    # The corner that is alone on its side of the level is cut off; its share of the area is the product of those of its two edges.
+    # The corner that is alone on its side of the level is cut off; its share of the area is the product of the shares of its two
+    # edges.
     with np.errstate(divide="ignore", invalid="ignore"):
         top = np.where(high > 0, high**2 / ((high - low) * (high - middle)), 0.0)
         bottom = np.where(low < 0, low**2 / ((high - low) * (middle - low)), 0.0)
@@ -145,8 +146,8 @@ def _all_edges(cells: Ints) -> Ints:
 
 def l2_distance(mesh: FieldMesh, values: Floats, exact: Callable[[Floats], Floats]) -> float:
     """The L2 norm over a ``mesh`` of intervals or triangles, in the plane or in space, of a Lagrange function minus an ``exact``
-    one, which gives values (q,) at points (q, d). The Lagrange function has ``values`` (N,) at the nodes: the vertices, and for
-    order 2 then the midpoints of ``mesh.edges``.
+    function, which gives values (q,) at points (q, d). The Lagrange function has ``values`` (N,) at the nodes: the vertices, and
+    for order 2 then the midpoints of ``mesh.edges``.
     """
     order = 1 if len(values) == len(mesh.points) else 2
     barycentric, weights = rule(mesh.cells.shape[1])

@@ -1,8 +1,8 @@
 """Fibres by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves evenly over another.
 
 The flux per area of an attachment is constant, so lines that start evenly over one attachment end evenly over the other, and cover
-both. The gradient of a potential that is constant on attachments is concentrated at their rims instead: in a sheet whose whole
-face is attached, nearly all lines start at the edge next to the other attachment.
+both. In contrast, the gradient of a potential that is constant on attachments is concentrated at their rims: in a sheet with a
+fully attached face, nearly all lines start at the edge next to the other attachment.
 """
 
 from dataclasses import dataclass
@@ -82,8 +82,8 @@ def streamlines(flux: Flow, count: int) -> Polylines:
     """``count`` lines of 40 points each along a ``flux``, each for the same area of both attachments; InputError if fewer can be
     traced.
 
-    Many lines start evenly over the area; those kept are the middles of groups that are compact at both ends (Lloyd 1982), measured
-    in units of the size of each attachment.
+    Many lines start evenly over the area; the lines kept are the middles of groups that are compact at both ends (Lloyd 1982),
+    measured in units of the size of each attachment.
     """
     if count > MOST:
         raise InputError("fibres.traced.count", count, f'at most {MOST} with flux = "area"')
@@ -158,7 +158,7 @@ def _neighbours(faces: Ints) -> Ints:
 
 
 def _middles(points: Floats, count: int) -> Ints:
-    """The indices of at most ``count`` of ``points`` (n, d): the one nearest to the middle of each group of Lloyd's algorithm."""
+    """The indices of at most ``count`` of ``points`` (n, d): in each group of Lloyd's algorithm the point nearest to the middle."""
     middles = spread(points, count)
     for _ in range(_ROUNDS):
         _, group = cKDTree(middles).query(points)

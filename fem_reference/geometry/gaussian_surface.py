@@ -26,7 +26,7 @@ _PROJECTIONS, _THERE = 12, 1e-9
 @dataclass(frozen=True, eq=False)
 class GaussianSurface:
     """The surface on which ``sum_i exp(-|x - centres_i|^2 / radii_i^2)`` is 1: ``centres`` (m, 3) and ``radii`` (m,) [mm], four
-    numbers for each Gaussian. A single one gives a point; n at one centre give a sphere of radius ``r sqrt(log n)``.
+    numbers for each Gaussian. A single Gaussian gives a point; n Gaussians at one centre give a sphere of radius ``r sqrt(log n)``.
     """
 
     centres: Floats

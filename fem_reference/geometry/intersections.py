@@ -15,7 +15,7 @@ def self_intersections(surface: Surface) -> Ints:
 
 
 def self_crossings(surface: Surface) -> Ints:
-    """Pairs (k, 2) of triangles of which an edge of one pierces the other.
+    """Pairs (k, 2) of triangles with an edge of one that pierces the other.
 
     Edges that share a vertex with the other triangle do not count, nor do triangles that touch, or overlap in one plane.
     """
@@ -51,7 +51,7 @@ def crossings(one: Surface, other: Surface) -> Ints:
 
 def overlaps(one: Floats, other: Floats) -> Floats:
     """Penetration (k,) [mm] of triangles ``one`` and ``other`` (k, 3, 3) that cross: the shortest displacement along the normal of
-    either that moves the other off its plane; 0 if either has no area.
+    one that moves the other off its plane; 0 if either has no area.
     """
     return np.asarray(np.nan_to_num([_reach(one, other), _reach(other, one)]).min(axis=0))
 

@@ -10,7 +10,7 @@ import platformdirs
 from fem_reference.foundations import native
 from fem_reference.foundations.mesh import Ints, Surface
 
-# No -ffast-math: it reorders sums, so that the bounds of their round-off would not hold.
+# No -ffast-math: it reorders sums, and the bounds of their rounding errors would not hold.
 _FLAGS = ("-O3", "-march=native")
 _ROOM = 1000
 
@@ -43,7 +43,7 @@ _kept = lru_cache(maxsize=8)(_Sorted)
 
 def near_pairs(one: Surface, other: Surface) -> Ints | None:
     """Pairs (k, 2) of triangles of two surfaces that may intersect or touch, or of one with itself, each pair
-    once: all that do, and few that do not. Triangles of one surface that share an edge, or only touch at a common corner, are left
+    once: all that do, and few others. Triangles of one surface that share an edge, or only touch at a common corner, are left
     out. None without a compiler, or if a point is not finite. Faster if ``other`` is the surface of an earlier call.
     """
     code = _code()

@@ -31,7 +31,7 @@ PARTS = np.array(
 # A face with corners a, b, c and points on its edges (ab, ac, bc): its four parts.
 _FACE_PARTS = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2], [3, 5, 4]])
 # The position of the cut on an edge at a rim, near which displacement varies with the square root of the distance. Each refinement
-# then divides the error due to the rim by four, order 2 instead of 1 (Bacuta, Nistor and Zikatanov 2005, doi
+# then divides the error due to the rim by four: the order is 2 instead of 1 (Bacuta, Nistor and Zikatanov 2005, doi
 # 10.1007/s00211-005-0588-3); where the solution is smooth, quadratic elements converge faster.
 GRADED = 0.25
 # A point moves towards the surface as long as the tets around it keep these shares of their volume and of their quality.
@@ -68,7 +68,7 @@ def _cut(mesh: TetMesh, on_rim: Bools) -> tuple[Ints, Ints, Floats]:
 
 
 def _on_rims(mesh: TetMesh, rims: tuple[str, ...]) -> Bools:
-    """Mask (n,) of the points on the rim of one of these regions: on an edge between a facet of the region and one outside it."""
+    """Mask (n,) of the points on the rim of one of these regions: on an edge between a facet of the region and a facet outside."""
     found = np.zeros(len(mesh.points), bool)
     for name in rims:
         faces = mesh.facets[name]
@@ -98,7 +98,7 @@ def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
 
 
 def _snapped(points: Floats, tets: Ints, surface: Surface) -> Floats:
-    """The ``points``, those of the boundary moved onto the surface at its volume, as far as the tets around them remain valid."""
+    """The ``points``, with boundary points moved onto the surface at constant volume, as far as the tets around them stay valid."""
     faces, _ = boundary(tets)
     outer = np.unique(faces)
     goal = np.array(points)

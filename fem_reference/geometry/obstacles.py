@@ -65,7 +65,9 @@ class Quadric:
         return np.asarray(turn @ turn.T)
 
     def pushed(self, points: Floats) -> Floats:
-        """The ``points`` (n, 3), those inside moved to the surface along its normal; those deep inside first off the axis."""
+        """The ``points`` (n, 3), with points inside moved to the surface along its normal; points deep inside are first moved off
+        the axis.
+        """
         own, thin = self._own(points), int(np.argmin(self.radii))
         own[np.sum((own / self.radii) ** 2, axis=1) < _MIDDLE**2, thin] = _MIDDLE * self.radii[thin]
         size = np.sqrt(np.sum((own / self.radii) ** 2, axis=1))
@@ -129,7 +131,7 @@ class Ring:
         return np.asarray(2 * (squares + around * (1 - self.radius / away)))
 
     def pushed(self, points: Floats) -> Floats:
-        """The ``points`` (n, 3), those inside moved to the surface, away from the circle."""
+        """The ``points`` (n, 3), with points inside moved to the surface, away from the circle."""
         middle = self._nearest(points)
         across = points - middle
         across[np.linalg.norm(across, axis=1) < _MIDDLE * self.tube] = _MIDDLE * self.tube * self.pose[:3, 2]
@@ -137,7 +139,7 @@ class Ring:
         return np.asarray(middle + across * np.maximum(self.tube / size, 1.0))
 
     def through(self, starts: Floats, ends: Floats) -> Floats:
-        """Points (n, 3) in the hole, nearest to where straight paths cross its plane; the midpoints of those that do not."""
+        """Points (n, 3) in the hole, nearest to the crossings of straight paths with its plane; else the midpoints of paths."""
         axis, centre = self.pose[:3, 2], self.pose[:3, 3]
         low, high = (starts - centre) @ axis, (ends - centre) @ axis
         crosses = low * high < 0

@@ -32,7 +32,7 @@ class Parts:
 
     @property
     def surface(self) -> Surface:
-        """The surface that all parts form."""
+        """The surface of all parts together."""
         return Surface(self.points, self.triangles)
 
     def area(self, label: int) -> float:
@@ -67,7 +67,7 @@ def _rim_edges(parts: Parts) -> Ints:
 
 
 def _along_rims(parts: Parts) -> Floats:
-    """Points (n, 3), those on a rim moved along it towards the middle between their neighbours; corners and ends stay."""
+    """Points (n, 3), with rim points moved along the rim towards the middle between their neighbours; corners and ends stay."""
     edges = _rim_edges(parts)
     count = len(parts.points)
     both = np.concatenate([edges, edges[:, ::-1]])
@@ -112,7 +112,7 @@ def collapsed(parts: Parts, short: float) -> Parts:
 
 
 def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> bool:
-    """True if ``goes`` has two ``neighbours`` on a rim, one of them ``stays``, and the rim hardly turns at ``goes``."""
+    """True if ``goes`` has two ``neighbours`` on a rim, one of which is ``stays``, and the rim hardly turns at ``goes``."""
     if len(neighbours) != 2 or stays not in neighbours:
         return False
     before, after = points[goes] - points[neighbours[0]], points[neighbours[1]] - points[goes]
@@ -120,7 +120,7 @@ def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> b
 
 
 def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) -> bool:
-    """True if ``goes`` may move onto ``stays``: the surface stays manifold, edges sharp, no triangle flips or is the flattest."""
+    """True if ``goes`` may move onto ``stays``: surface manifold, edges sharp, no triangle flipped or flatter than the flattest."""
     points, triangles = parts.points, parts.triangles
     here, there = set(triangles[around[goes]].ravel().tolist()), set(triangles[around[stays]].ravel().tolist())
     if len(here & there) != 4 or len(here | there) < 6:  # two ends and two common neighbours; more than a tetrahedron
@@ -147,8 +147,8 @@ def _flatness(points: Floats, triangles: Ints) -> Floats:
 
 def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Floats:
     """The points (n, 3) [mm] moved so that the parts have given ``areas`` [mm2], from label 1 on, and enclose a ``volume`` [mm3]:
-    both are too small before, like a polygon inscribed in a circle. In each round the whole rim of a part moves outwards by the
-    same distance, at most ``most`` [mm], and then all points move along their normals.
+    before the move both are too small, like a polygon inscribed in a circle. In each round the whole rim of a part moves outwards
+    by the same distance, at most ``most`` [mm], and then all points move along their normals.
     """
     for _ in range(_ROUNDS):
         points = np.array(parts.points)

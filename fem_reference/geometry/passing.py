@@ -18,7 +18,7 @@ def passed(starts: Floats, ends: Floats, before: Floats, after: Floats) -> NDArr
     whose corners move straight from ``before`` to ``after`` (n, 3, 3), from its front to its back.
 
     The volume of the tetrahedron between point and triangle is a cubic in the share of the path (Provot 1997, Collision and
-    self-collision handling in cloth model dedicated to design garments); where it falls to 0 the point is in the plane.
+    self-collision handling in cloth model dedicated to design garments); where it is 0 the point is in the plane.
     """
 
     def at(share: float, some: NDArray[np.int64] | slice) -> tuple[Floats, Floats]:

@@ -31,8 +31,8 @@ class RadialSum:
 
 
 def radial_sum(points: Floats, values: Floats, centres: Floats, shape: float, *, terms: int = 0) -> RadialSum:
-    """The least-squares fit with these ``centres`` (m, d) to ``values`` (n,) at ``points`` (n, d); as many centres as points
-    interpolate. ``terms`` of the polynomial: 0, 1 or d + 1; the weights are orthogonal to it (3.10).
+    """The least-squares fit with these ``centres`` (m, d) to ``values`` (n,) at ``points`` (n, d); with as many centres as points
+    it interpolates. ``terms`` of the polynomial: 0, 1 or d + 1; the weights are orthogonal to it (3.10).
     """
     if len(centres) > len(points) or len(centres) <= terms:
         raise InputError("centres", len(centres), f"more than {terms}, at most {len(points)}, the number of points")
@@ -77,7 +77,9 @@ def halton_centres(points: Floats, count: int) -> Floats:
 
 
 def greedy_centres(points: Floats, values: Floats, count: int, shape: float, *, terms: int = 0) -> Floats:
-    """``count`` of the ``points`` (n, d), each where the sum with the previous centres deviates most from ``values`` (n,)."""
+    """``count`` of the ``points`` (n, d): each is the point at which the sum with the previous centres deviates most from
+    ``values`` (n,).
+    """
     chosen = list(np.argsort(-np.abs(values - values.mean()), kind="stable")[: terms + 1])
     while len(chosen) < count:
         off = np.abs(values - radial_sum(points, values, points[chosen], shape, terms=terms)(points))

@@ -17,7 +17,7 @@ Depth = Callable[[Floats], Floats]
 _RISE = 1000.0
 # Points on the border of a cell are moved by this share of the way to its middle, so that they are in the regions of the cell.
 INWARDS = 1e-6
-# The approximate number of sample points in a body, whatever its size.
+# The approximate number of sample points in a body of any size.
 _SAMPLES = 20_000
 
 
@@ -27,8 +27,8 @@ class Blended:
     ``width`` [mm].
 
     In a region a thousand times as stiff as the body, the stiffness then grows by the same factor in equal parts of the width, and
-    elements that resolve the width converge; with ``3 t^2 - 2 t^3`` most of the growth would be in a fiftieth of the width. The
-    stiffer of two materials should therefore be the region. In series, 0.14 of the width counts as soft.
+    elements that resolve the width converge; with ``3 t^2 - 2 t^3`` most of the growth would be in a fiftieth of the width. So the
+    stiffer of two materials should be the region. In series, 0.14 of the width counts as soft.
     """
 
     depth: Depth
@@ -80,7 +80,7 @@ class Around:
 @dataclass(frozen=True, eq=False)
 class Between:
     """The part of a body where a Laplace ``field`` between two attachments is between ``first`` and ``last``; 0 and 1 mean up
-    to an attachment. The depth is the difference of the field from these divided by its mean slope.
+    to an attachment. The depth is the difference of the field from these values divided by its mean slope.
     """
 
     field: FibreField

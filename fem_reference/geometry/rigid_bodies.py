@@ -1,8 +1,8 @@
-"""Signed distance to bones of closed form, and the protocol that all obstacles follow.
+"""Signed distance to bones of closed form, and the protocol of all obstacles.
 
 Each body uses its own rest frame. Distances are negative inside; gradients are unit vectors out of the body, along the normal at
-the nearest part of the surface; curvatures are the second derivatives. On ridges, where two parts are equally near, one of them is
-taken; an infinite curvature (on a sharp edge, at a centre, on an axis) is replaced by zero.
+the nearest part of the surface; curvatures are the second derivatives. On ridges, where two parts are equally near, one of the two
+is used; an infinite curvature (on a sharp edge, at a centre, on an axis) is replaced by zero.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ class Sampled(NamedTuple):
 
 
 class Obstacle(Protocol):
-    """A rigid body with a signed distance, which along a path changes by at most ``steepest`` times the length of the path."""
+    """A rigid body with a signed distance that changes along a path by at most ``steepest`` times the length of the path."""
 
     @property
     def steepest(self) -> float:
@@ -38,7 +38,7 @@ class Obstacle(Protocol):
         """The greatest depth [mm] inside the body."""
 
     def clearance(self, within: float) -> Callable[[Floats], Floats]:
-        """A lower bound (n,) [mm] of the length of paths from points (n, 3) to where the distance is at most ``within`` [mm]."""
+        """A lower bound (n,) [mm] of the length of paths from points (n, 3) to a distance of at most ``within`` [mm]."""
 
     def sample(self, points: Floats) -> Sampled:
         """Distance and its two derivatives at ``points`` (n, 3) [mm] of the body's rest frame; NaN for NaN."""

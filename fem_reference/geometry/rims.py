@@ -1,4 +1,4 @@
-"""Rims of attachments as edges of a coarse surface: its triangles end at the rim."""
+"""Rims of attachments as edges of a coarse surface: triangles end at the rim."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,7 +18,8 @@ Bools = NDArray[np.bool_]
 
 # Chosen by trials on the report's muscles and our own hip. Smoothing length of the shares in triangle sizes; more rounds corners.
 _SMOOTHED = 0.1
-# A vertex closer to a crossing than this share of the edge moves there. Above 0.35 triangles degenerate, below 0.25 slivers remain.
+# A vertex closer to a crossing than this share of the edge moves to the crossing. Above 0.35 triangles degenerate, below 0.25
+# slivers remain.
 _NEAR = 0.3
 # A fixed vertex closer to a crossing than this share of the edge counts as on the rim.
 _THERE = 0.2
@@ -99,7 +100,7 @@ def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
 
 
 def _islands(fine: Surface, shares: Floats) -> Ints:
-    """The index (m, 3) of the connected island of shares above a half in which each corner lies, -1 outside all islands."""
+    """The index (m, 3) of the connected island of shares above a half that contains each corner, -1 outside all islands."""
     attached = np.zeros(len(fine.points), bool)
     attached[fine.triangles[shares > 1 / 2]] = True
     ends = fine.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -125,7 +126,7 @@ def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) 
 
 
 def _refined(parts: Parts, fine: Surface, edges: "_Edges") -> Parts:
-    """The parts after cutting edges that are beyond the level 1/2 along much of their length, but not at their ends."""
+    """The parts after cuts of edges that are above the level 1/2 along much of their length, but not at their ends."""
     other = (edges.along > 1 / 2) != (edges.along[:, :1] > 1 / 2)
     narrow = np.flatnonzero((other.mean(axis=1) > _NARROW) & ~other[:, -1])
     at = (other[narrow] @ np.arange(_SAMPLES) / other[narrow].sum(axis=1) / (_SAMPLES - 1))[:, None]

@@ -58,8 +58,8 @@ class Grid:
     ``coefficients`` (i, j, k) [mm] of the B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``. The distance
     is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and ``FAR`` outside the grid.
     ``error`` [mm] is the largest difference found from the exact distance within one spacing of the surface, and
-    ``mean_error`` [mm] the root mean square there. Farther away, the ridges between two close parts of the surface are
-    rounded as edges are: by a third of a spacing. The gradient is the spline's: a unit vector up to a few percent, more on edges.
+    ``mean_error`` [mm] the root mean square there. Farther away, the ridges between two close parts of the surface are rounded like
+    edges, by a third of a spacing. The gradient is the spline's: a unit vector up to a few percent, more on edges.
     """
 
     coefficients: Floats
@@ -163,10 +163,10 @@ def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0
 
 def resolve(surface: Surface, error: float, margin: float) -> Grid:
     """The grid of :func:`build` whose spacing is halved until its ``mean_error`` is at most ``error`` [mm] or ``MOST_NODES`` is
-    reached; the grid's ``mean_error`` tells what was reached.
+    reached; the grid's ``mean_error`` states the reached error.
 
     The largest error is not a suitable measure: on sharp edges and thin rims, which a grid rounds, it decreases only in proportion
-    to the spacing, and in a slit narrower than a cell not at all.
+    to the spacing, and does not decrease in a slit narrower than a cell.
     """
     spacing = float(np.ptp(surface.points, axis=0).max()) / _FIRST_CELLS
     grid = build(surface, spacing, margin)
@@ -180,7 +180,9 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
 
 
 def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
-    """The grid of :func:`build` at the spacing of :func:`resolve`, stored in ``folder`` under a hash of all that it depends on."""
+    """The grid of :func:`build` at the spacing of :func:`resolve`, stored in ``folder`` under a hash of everything on which it
+    depends.
+    """
     code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
     name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
 
@@ -240,7 +242,7 @@ def _errors(grid: Grid, surface: Surface) -> tuple[float, float]:
 
 
 def _on(surface: Surface) -> Floats:
-    """All vertices, the midpoints of edges and triangles, and random points on edges, more on longer ones: (n, 3) [mm]."""
+    """All vertices, the midpoints of edges and triangles, and random points on edges, more on longer edges: (n, 3) [mm]."""
     random = np.random.default_rng(0)
     ends = surface.points[surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

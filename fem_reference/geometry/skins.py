@@ -36,7 +36,7 @@ class Skin:
 
 
 def spacing(surface: Surface) -> float:
-    """The average distance [mm] of points on a ``surface`` that is allowed at most, independent of its mesh."""
+    """The greatest allowed average distance [mm] of points on a ``surface``, independent of its mesh."""
     return diagonal(surface.points) / _ACROSS
 
 
@@ -51,8 +51,8 @@ def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float)
 
 
 def points(corners: Floats, shares: Floats) -> tuple[Floats, Floats]:
-    """Three points (3 k, 3) [mm] in each triangle of ``corners`` (k, 3, 3), a rule exact for quadratic functions without points on
-    sharp edges, which would be in contact on two faces at once; and their areas (3 k,) [mm2], weighted by ``shares`` (k, 3).
+    """Three points (3 k, 3) [mm] in each triangle of ``corners`` (k, 3, 3), by a rule exact for quadratic functions without points
+    on sharp edges, as these would be in contact on two faces at once; and their areas (3 k,) [mm2], weighted by ``shares`` (k, 3).
     """
     areas = np.repeat(corner_areas(corners) / 3, 3) * (shares @ _RULE.T).ravel()
     return np.einsum("qk,tki->tqi", _RULE, corners).reshape(-1, 3), areas

@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.geometry.curves import catmull_rom, knots
 from fem_reference.geometry.fibres import POINTS, resample
 
-_THIN = 1e-6  # the squared thickness of a section over its squared width below which its lines count as lying on one surface
+_THIN = 1e-6  # the squared thickness of a section over its squared width below which its lines count as on one surface
 _GOLDEN = np.pi * (3 - np.sqrt(5))  # the golden angle, from seed to seed of a sunflower [rad]
 
 
@@ -56,8 +56,9 @@ def _halfway(lines: Floats) -> Floats:
 
 
 def outermost(lines: Polylines, count: int) -> Polylines:
-    """At most ``count`` of ``lines``, with 40 points each: the outermost halfway in each of ``count`` sectors. Sectors are equal
-    after a stretch that makes the section of the lines as wide in all directions, so that a flat muscle has lines on all sides.
+    """At most ``count`` of ``lines``, with 40 points each: the line that is outermost halfway in each of ``count`` sectors. Sectors
+    are equal after a stretch that makes the section of the lines as wide in all directions, so that a flat muscle has lines on all
+    sides.
     """
     found = _alike(lines, 0)
     arms = _halfway(found)

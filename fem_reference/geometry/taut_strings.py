@@ -13,7 +13,7 @@ Flags = NDArray[np.bool_]
 
 # Numbers of pieces of a string and of sweeps over it, and their overrelaxation: 1 moves a point to the middle of its neighbours.
 _PIECES, _SWEEPS, _BEYOND = 48, 120, 1.8
-# The largest number of points of a string; a very thin tube would need more, lest a piece of the string slip past it.
+# The largest number of points of a string; for a very thin tube more would be needed, so that no piece slips past the tube.
 MOST = 10_000
 
 
@@ -60,7 +60,7 @@ def touching(obstacle: SmoothSurface, string: Floats) -> Flags:
 
 
 def met(obstacles: Sequence[SmoothSurface], string: Floats) -> list[tuple[int, ...]]:
-    """The obstacles that each path may meet, in their order along it."""
+    """The obstacles that each path may touch, in their order along the path."""
     flags = np.array([touching(obstacle, halved(string)) for obstacle in obstacles])
     count = flags.sum(axis=2)
     middle = (flags * np.arange(flags.shape[2])).sum(axis=2) / np.maximum(count, 1)

@@ -35,16 +35,18 @@ log = logging.getLogger(__name__)
 
 SECONDS_ALLOWED = 240.0
 _ROUNDED = 6  # decimals [mm] in the mesher's frame: far below any size, far above the round-off from moving a surface
-_VOLUME_WITHIN = 0.05  # relative; not less, as the volume of a surface that intersects itself is not well defined
-_MOST_TETS = 3e6  # takes some GB and minutes, far more than a solver can use
+_VOLUME_WITHIN = (
+    0.05  # relative; a smaller value fails, as the volume of a surface that intersects itself is not well defined
+)
+_MOST_TETS = 3e6  # needs some GB and minutes, far more than a solver can use
 _MAKERS = {"gmsh": "gmsh", "tetwild": "fTetWild"}
 _SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the requested number of triangles, tried in turn
 
 
 def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] | None = None) -> TetMesh:
-    """Tetrahedra of edge length ``size`` [mm] that fill a closed, outward ``surface`` of m triangles. Those of gmsh have ``facets``
-    for each attachment; its ``shares`` (m, 3) are the attached shares of the corners of triangles. ``maker`` names the mesher.
-    InputError if no mesher succeeds, and at once where ``size`` is far too small or too large.
+    """Tetrahedra of edge length ``size`` [mm] that fill a closed, outward ``surface`` of m triangles. Tetrahedra by gmsh have
+    ``facets`` for each attachment; its ``shares`` (m, 3) are the attached shares of the corners of triangles. ``maker`` names the
+    mesher. InputError if no mesher succeeds, and at once if ``size`` is far too small or too large.
 
     A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface without
     self-intersections and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so that it moves with
@@ -115,8 +117,8 @@ def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) ->
 
 
 def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> tuple[Surface, Ints]:
-    """The surface with as many triangles as equilateral ones of side ``size`` would cover it, unchanged if it has fewer, with edges
-    along the rims of attachments; and the labels of its triangles, 0 if free.
+    """The surface with as many triangles as equilateral triangles of side ``size`` would need to cover it, unchanged if it has
+    fewer, with edges along the rims of attachments; and the labels of its triangles, 0 if free.
 
     If the coarse surface intersects itself, a few other counts are tried, and then a surface without rims.
     """
@@ -183,8 +185,8 @@ def last_words(done: subprocess.CompletedProcess[str]) -> str:
 def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
     """The largest connected part of ``mesh``, its tets of positive volume, without unused points.
 
-    InputError if nothing is left, a tet is flat, or the volume of the tets is not about that of ``surface``. Their boundary is
-    closed, as no triangle belongs to more than two of them.
+    InputError if nothing is left, a tet is flat, or the volume of the tets is far from that in ``surface``. Their boundary
+    is closed, as no triangle belongs to more than two of them.
     """
     if len(mesh.tets) == 0:
         raise InputError(surface.place, "no tetrahedra from the mesher", "a surface that bounds a body")

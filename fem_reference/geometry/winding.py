@@ -1,8 +1,8 @@
 """The shortest paths around several smooth obstacles: straight pieces and geodesics in turn, joined without kinks.
 
-A taut string finds the obstacles that a path meets, and roughly where; Newton's method then finds the point, direction and length
-of each geodesic for which all pieces join smoothly (Scholz et al. 2016, Multibody Syst. Dyn. 36, 195-219,
-DOI 10.1007/s11044-015-9451-1). A path is a local minimum of length near the straight path, and meets each obstacle at most once.
+A taut string finds the obstacles that a path touches, and approximately where; Newton's method then finds the point, direction and
+length of each geodesic for which all pieces join smoothly (Scholz et al. 2016, Multibody Syst. Dyn. 36, 195-219, DOI
+10.1007/s11044-015-9451-1). A path is a local minimum of length near the straight path, and touches each obstacle at most once.
 """
 
 from collections.abc import Sequence
@@ -26,8 +26,8 @@ _CHECKED = 200
 class Winding:
     """n paths through K ``knots`` (n, K, 3) [mm], whose unit ``tangents`` are (n, K, 3), after the lengths ``arcs`` (n, K) [mm].
 
-    They follow the obstacles ``met`` (n, m) in turn, each over the same number of knots; on a path with fewer than m, all other
-    knots are at the end. ``failed`` (n,) is True where Newton's method found no path.
+    They follow the obstacles ``met`` (n, m) in turn, each over the same number of knots; on a path with fewer than m obstacles, all
+    other knots are at the end. ``failed`` (n,) is True if Newton's method found no path.
     """
 
     knots: Floats
@@ -216,7 +216,7 @@ def _guess(met: list[tuple[int, SmoothSurface]], string: Floats) -> _Pieces:
 
 
 def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
-    """The geodesics for which Newton's method removes the kinks, and a mask (n,), True where it succeeds."""
+    """The geodesics for which Newton's method removes the kinks, and a mask (n,), True if it succeeds."""
     near = _SMALL * (np.linalg.norm(pieces.ends - pieces.starts, axis=1) + np.abs(pieces.sizes).sum(axis=0))
     most = np.array([[one.bend / 2, one.bend / 2, 0.5, one.bend] for one in pieces.obstacles]).ravel()
     todo, part, kinks = np.arange(len(near)), pieces, pieces.kinks()

@@ -1,8 +1,8 @@
 """The shortest paths between two points around a wrapping surface, a sphere or a cylinder: straight, geodesic, straight.
 
-Along the surface a path is a geodesic: a great circle of the sphere, a helix of the cylinder. In a view along the axis of
-rotation, each is an arc of a circle between two tangents, so that one closed form serves both (the "obstacles" of
-Garner and Pandy 2000, Comput. Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/10255840008915251; report 5.3).
+Along the surface a path is a geodesic: a great circle of the sphere, a helix of the cylinder. In a view along the axis of rotation,
+each is an arc of a circle between two tangents, so one closed form holds for both (the "obstacles" of Garner and Pandy 2000,
+Comput. Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/10255840008915251; report 5.3).
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from fem_reference.geometry.obstacles import Quadric, Touch
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """n paths: ``parts`` (n, 3) [mm], their lengths before, along and after the surface; a straight path is wholly before it.
+    """n paths: ``parts`` (n, 3) [mm], their lengths before, along and after the surface; a straight path is entirely before it.
 
     ``starts``, ``ends``, and ``touches``, the points where each meets and leaves the surface: (n, 3) [mm]. Along it a path turns
     by ``turns`` (n,) [rad] about the unit ``axes`` (n, 3) through ``middles`` (n, 3) and climbs along them evenly.
@@ -73,8 +73,8 @@ class Paths:
 
 
 def around(obstacle: Quadric, starts: Floats, ends: Floats) -> Paths:
-    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along the great circle through both, any
-    one if they are opposite each other; or a cylinder, along a helix. Points inside count as on the surface.
+    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along the great circle through both
+    points, any such circle if they are opposite each other; or a cylinder, along a helix. Points inside count as on the surface.
     """
     middle = obstacle.pose[:3, 3]
     if np.isfinite(obstacle.radii[2]):
@@ -98,8 +98,8 @@ def _around(starts: Floats, ends: Floats, middle: Floats, axes: Floats, radius: 
     """The paths that turn from starts to ends, by at most half a turn, about ``axes`` (n, 3) through ``middle`` (3,).
 
     In a view along the axis, points at distances d1, d2 from it and an angle t apart are joined by tangents of lengths
-    sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)), or straight where that angle is not positive. The
-    displacement along the axis is distributed evenly over that length: unrolled, the path is a straight line.
+    sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)), or straight if this angle is not positive. The displacement
+    along the axis is distributed evenly over this length: unrolled, the path is a straight line.
     """
     one, other = _across(starts - middle, axes), _across(ends - middle, axes)
     sines, cosines = np.sum(np.cross(one, other) * axes, axis=1), np.sum(one * other, axis=1)
@@ -146,7 +146,7 @@ def _across(vectors: Floats, axes: Floats) -> Floats:
 
 
 def _perpendicular(normals: Floats, arms: Floats) -> Floats:
-    """``normals`` (n, 3) scaled to length 1; for one that is only round-off, some direction perpendicular to its arm."""
+    """``normals`` (n, 3) scaled to length 1; for a normal that is only rounding, some direction perpendicular to its arm."""
     sizes = np.linalg.norm(normals, axis=1)[:, None]
     squares = np.sum(arms**2, axis=1)[:, None]
     spare = np.cross(arms, np.eye(3)[np.argmin(np.abs(arms), axis=1)])

@@ -1,1 +1,1 @@
-"""Reading and writing of files: meshes and texts, written whole or not at all."""
+"""Reading and writing of files: meshes and texts, written completely or not at all."""

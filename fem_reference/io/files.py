@@ -1,4 +1,4 @@
-"""Reading and writing of surfaces, polylines and tetrahedra in common mesh formats; files are written whole or not at all.
+"""Reading and writing of surfaces, polylines and tetrahedra in common mesh formats; files are written completely or not at all.
 
 A reader keeps the order and the number of the points and, if the file has it, their double precision.
 """
@@ -188,9 +188,7 @@ def write_text(path: Path, text: str) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """A file beside ``path`` to write to, which replaces ``path`` on success and is removed otherwise. An OSError names ``path``
-    and, if the disk is full, the free space.
-    """
+    """A file to write to, which replaces ``path`` on success. An OSError names ``path`` and, on a full disk, the free space."""
     part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
     clear(path)
     try:

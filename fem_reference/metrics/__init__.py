@@ -26,7 +26,7 @@ from fem_reference.scenes.case import Part, Standard
 
 # Places where pages show a statistic: ``main``, notebooks and omissions; ``table``, the first table of a comparison; ``headline``,
 # its sentence; ``curve``, drawings of changes from rest; ``angle``, those over the angle of a joint; ``solvers``, tables of
-# solvers; ``scenes``, the table over all scenes; ``rank``, rankings of solvers; ``claim``, error bars beside true errors.
+# solvers; ``scenes``, the table over all scenes; ``rank``, rankings of solvers; ``claim``, error bars compared with true errors.
 Shown = Literal["main", "table", "headline", "curve", "angle", "solvers", "scenes", "rank", "claim"]
 
 
@@ -272,7 +272,7 @@ def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None =
 
 
 def as_surface(run: Run) -> Run:
-    """The run without an interior: its surface carries the measured fibres, like that of a candidate."""
+    """The run without an interior: its surface carries the measured fibres, as for a candidate."""
     return replace(run, fibres=None, fibre_positions=None)
 
 

@@ -1,4 +1,4 @@
-"""Dihedral angles at the edges of a run's surface against those of the reference.
+"""Dihedral angles at the edges of a run's surface, compared with the reference.
 
 Against rest, the mean magnitude is the dihedral angle change of the report (eq. 5.23, Figs 6.18 to 6.20).
 """

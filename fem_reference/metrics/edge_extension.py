@@ -1,4 +1,4 @@
-"""Lengths of the edges of a run's surface against those of the reference, in per cent of their rest length.
+"""Lengths of the edges of a run's surface, compared with the reference, in per cent of their rest length.
 
 Against rest this is the edge extension of the report (l / L of Figs 6.15 to 6.17) less one.
 """

@@ -73,9 +73,7 @@ def _both_directions(run: Run, reference: Run, frame: int) -> Floats:
 
 
 def _percent(values: Floats, travel: float) -> Floats:
-    """``values`` (f,) [mm] in per cent of ``travel`` [mm]; if the travel is 0, they are 0 for a value of 0 and infinite for other
-    values.
-    """
+    """``values`` (f,) [mm] in per cent of ``travel`` [mm]; for a travel of 0, values of 0 give 0 and all others infinity."""
     if travel == 0:
         return np.where(values == 0, 0.0, values + np.inf)
     return np.asarray(100 * values / travel)

@@ -1,4 +1,4 @@
-"""Volume of a run against that of the reference, frame by frame."""
+"""Volume of a run, compared with the reference, frame by frame."""
 
 import numpy as np
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, boundary, enclosed_volume
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, boundary, enclosed_volume, united
 from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import join
 from fem_reference.geometry.coarsening import resampled
@@ -127,9 +127,7 @@ def _patches(path: Path, outline: Outline, place: str) -> Surface:
         if len(clouds[name]) < 3:
             raise InputError(f'{path}: cloud "{name}"', f"{len(clouds[name])} landmarks", "at least three")
         patches.append(fan(np.array(clouds[name]) + moved))
-    starts = np.cumsum([0, *(len(patch.points) for patch in patches)])
-    triangles = [patch.triangles + start for patch, start in zip(patches, starts, strict=False)]
-    return Surface(np.concatenate([patch.points for patch in patches]), np.concatenate(triangles), str(path))
+    return Surface(*united([(patch.points, patch.triangles) for patch in patches]), str(path))
 
 
 def draped(patches: Surface, bone_surface: Surface) -> Surface:
@@ -196,7 +194,7 @@ def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMes
 
 
 def _turning(case: MuscleCase) -> Floats:
-    """The matrix (3, 3) from the directions of the lines to those of the material."""
+    """The matrix (3, 3) from the directions of the lines to the directions in the material."""
     if (turned := case.fibres.turned) is None:
         return np.eye(3)
     return RigidMotion(turned.axis, (0.0, 0.0, 0.0), (0.0,), (turned.angle,)).pose(0.0)[:3, :3]
@@ -269,9 +267,7 @@ def _read(case: MuscleCase, given: PolylineFile, key: str) -> Polylines:
 
 
 def inside(surface: Surface, fibres: Polylines) -> Polylines:
-    """The fibres with each point outside the ``surface`` moved to the nearest point of the surface, as there is no solution
-    outside.
-    """
+    """The fibres with points outside the ``surface`` moved to its nearest points, as there is no solution outside."""
     away = signed_distances(fibres.points, surface)
     points = np.array(fibres.points)
     points[away > 0] = distances(points[away > 0], surface).closest

@@ -118,7 +118,7 @@ def reference_nodes(kind: Kind, degree: int) -> Floats:
 @dataclass(frozen=True, eq=False)
 class Cells:
     """The mesh of a body: ``points`` (n, 3) [mm] at rest, and ``cells`` (m, k), the indices of the points of each cell
-    in the order of :func:`reference_nodes`. ``degree`` 1: straight cells; 2: curved ones. ``facets``: by name of a
+    in the order of :func:`reference_nodes`. ``degree`` 1: straight cells; 2: curved cells. ``facets``: by name of a
     region of the surface, the corners (f, 3 or 4) of its facets.
     """
 

@@ -1,6 +1,5 @@
 """Estimates for a muscle case before it is solved, and the effects that they show to be needed."""
 
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -12,23 +11,11 @@ from fem_reference.foundations.material_point import fibre_tension
 from fem_reference.foundations.mesh import Floats, Ints, edge_vectors, triangle_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.regions import samples
+from fem_reference.problems import guess
 from fem_reference.problems.anatomy import lean
-from fem_reference.problems.guess import (
-    Guess,
-    axis_of,
-    distance,
-    length_of,
-    motion,
-    sag,
-    spans,
-    strain,
-    thickness_of,
-    turn,
-)
+from fem_reference.problems.guess import Guess
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.scenes.muscle import MuscleCase
-
-log = logging.getLogger(__name__)
 
 # An effect that moves the surface less than this is negligible: a share of the size of the scene's tetrahedra, or of the travel of
 # the surface if that is less. Error bars of the surface (rms) are 0.03 to 0.14 of the size and 0.01 to 0.05 of the travel; bars of
@@ -137,21 +124,21 @@ def estimates(case: MuscleCase, rest: Setup) -> Estimates:
     instants = np.unique(np.linspace(0, len(case.numbers) - 1, _FRAMES).round().astype(int))
     frames, chosen = [case.numbers[i] for i in instants], _chosen(rest)
     points, places = rest.surface.points[chosen], rest.exempt.places(_PLACES) @ rest.surface.points
-    guess, felt = Guess.of(points, rest), Guess.of(places, rest)
+    guessed, felt = Guess.of(points, rest), Guess.of(places, rest)
     moved = {frame: felt.at(frame) if rest.attached else places for frame in frames}
-    travel = max(float(np.linalg.norm(guess.at(frame) - points, axis=1).max()) for frame in frames)
-    speed, sideways, jump, acceleration = motion(guess, axis_of(rest), case.numbers)
+    travel = max(float(np.linalg.norm(guessed.at(frame) - points, axis=1).max()) for frame in frames)
+    speed, sideways, jump, acceleration = guess.motion(guessed, guess.axis_of(rest), case.numbers)
     size, shear = case.muscle.tet_size / 2**case.muscle.refinements, _shear(case, rest)
-    most = max(strain(points, guess.at(frame)) for frame in frames) if rest.attached else 0.0
+    most = max(guess.strain(points, guessed.at(frame)) for frame in frames) if rest.attached else 0.0
     (low, high), taut = _stretch(rest, frames), _taut(case)
     return Estimates(
-        length=length_of(rest),
-        thickness=thickness_of(rest),
+        length=guess.length_of(rest),
+        thickness=guess.thickness_of(rest),
         shear=shear,
         tension=_tension(case),
         fixed=len(rest.attached),
-        sag=sag(rest, frames, travel),
-        lean=lean(case, axis_of(rest)),
+        sag=guess.sag(rest, frames, travel),
+        lean=lean(case, guess.axis_of(rest)),
         travel=travel,
         stretch=(taut * low, taut * high),
         interval=case.frames.interval,
@@ -207,10 +194,10 @@ def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
     """The expected range of fibre stretch: from the line between attachments, and from bending as the bones turn."""
     if len(rest.attached) < 2:
         return 1.0, 1.0
-    length, half = length_of(rest), thickness_of(rest) / 2
+    length, half = guess.length_of(rest), guess.thickness_of(rest) / 2
     found = []
-    for frame, line in zip(frames, spans(rest, tuple(frames)) / length, strict=True):
-        bent = half / length * turn(rest, frame)
+    for frame, line in zip(frames, guess.spans(rest, tuple(frames)) / length, strict=True):
+        bent = half / length * guess.turn(rest, frame)
         found += [float(line) - bent, float(line) + bent]
     return max(min(found), 0.2), max(found)
 
@@ -221,7 +208,7 @@ def stretched(rest: Setup, positions: Floats) -> tuple[float, float]:
     """
     if len(rest.attached) < 2:
         return 1.0, 1.0
-    triangles, axis = rest.surface.triangles, axis_of(rest)
+    triangles, axis = rest.surface.triangles, guess.axis_of(rest)
     parts = np.linalg.pinv(edge_vectors(rest.surface.points[triangles])) @ axis
     along, moved = (
         np.linalg.norm(np.einsum("tij,tj->ti", edge_vectors(points[triangles]), parts), axis=1)
@@ -240,7 +227,7 @@ def _near(bone: Bone, points: Floats, moved: Mapping[int, Floats] | Mapping[floa
     gap = np.maximum(np.maximum(low - local, local - high), 0).max(axis=2) - off  # the gap to the box around the bone
     some = gap < _FELT
     if some.any():
-        gap[some] = distance(bone, local[some]) - off[some]
+        gap[some] = guess.distance(bone, local[some]) - off[some]
     nearest = gap.min(axis=1, initial=np.inf)
     depths = np.sqrt((np.minimum(gap, 0) ** 2).sum(axis=1) / max(1, gap.shape[1]))
     first = int(nearest.argmin())

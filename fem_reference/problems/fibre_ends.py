@@ -68,9 +68,7 @@ class FibreEnds:
 
     @cached_property
     def facts(self) -> dict[str, float | str]:
-        """The numbers of all ends, of ends that continue as a tendon, and of ends beside their attachment, with their names; and
-        the covered share of each attachment [%].
-        """
+        """The numbers of all ends, of ends with a tendon, and of ends beside their attachment (named); the covered shares [%]."""
         tied = np.isfinite(self.tendons[:, :, 0])
         found: dict[str, float | str] = {
             "fibre_ends": float(self.by.size),

@@ -46,8 +46,8 @@ def distance(bone: Bone, points: Floats) -> Floats:
 
 
 def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float, float, float, float]:
-    """The greatest speed, speed perpendicular to an ``axis`` (3,), jump of velocity, and acceleration of a guess, each the root
-    mean square over its points and per frame number. A jump is a change of velocity much greater than usual.
+    """The greatest speed, speed perpendicular to an ``axis`` (3,), jump of velocity, and acceleration of a guess, per frame number;
+    each is a root mean square over its points. A jump is a change of velocity much greater than usual.
     """
     some = slice(None, None, max(1, len(guess.points) // 100))
     guess = replace(guess, points=guess.points[some], weights=guess.weights[some])
@@ -131,7 +131,7 @@ def turn(rest: Setup, frame: float) -> float:
 
 
 def length_of(rest: Setup) -> float:
-    """The length [mm] from the first attachment to the last, or of the whole muscle without two attachments."""
+    """The length [mm] from the first attachment to the last, or of the entire muscle without two attachments."""
     middles = centres(rest) or [np.zeros(3)]
     return float(np.linalg.norm(middles[0] - middles[-1])) or diagonal(rest.surface.points)
 

@@ -71,7 +71,7 @@ class Share:
 
 def join(bodies: Mapping[str, Body], touching: tuple[Touching, ...] = ()) -> Body:
     """The body joined from ``bodies`` by name, with contact ``touching`` between facets of the joined body. Effects that all bodies
-    have act everywhere, other effects act in the cells of their bodies. InputError if bodies differ in what must be the same.
+    have act everywhere, other effects act in the cells of their bodies. InputError if bodies differ in shared properties.
     """
     ends = np.cumsum([0, *(len(one.mesh.cells) for one in bodies.values())]).tolist()
     ranges = {name: (first, last) for name, first, last in zip(bodies, ends, ends[1:], strict=False)}

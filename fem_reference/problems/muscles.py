@@ -1,7 +1,7 @@
 """Several muscles of one scene: a set-up and a problem for each, and all together as one body with contact between them."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import combinations
@@ -15,7 +15,7 @@ from fem_reference.effects import contact as contacts
 from fem_reference.effects.touching import MuscleContact
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.indicators import Indicator
-from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
+from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, united
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.interpenetration import skin_of
@@ -61,7 +61,7 @@ class MusclesSetup:
     @property
     def rest(self) -> AtRest:
         """The surfaces alone, as one."""
-        return AtRest(_surfaces([one.surface for one in self.muscles.values()]))
+        return AtRest(_surfaces(self.muscles.values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,8 @@ class MusclesProblem:
             blank = [np.tile([1.0, 0.0, 0.0], (len(one.mesh.tets), 1)) for one in found]
             along = np.concatenate([no if one is None else one for one, no in zip(known, blank, strict=True)])
         fibres = Polylines(np.concatenate([one.fibres.points for one in found]), np.cumsum([0, *counts]))
-        return AtRest(_surfaces([one.surface for one in found]), fibres, _meshes([one.mesh for one in found]), along)
+        mesh = TetMesh(*united([(one.mesh.points, one.mesh.tets) for one in found]), maker=found[0].mesh.maker)
+        return AtRest(_surfaces(found), fibres, mesh, along)
 
     @property
     def muscle(self) -> MuscleProblem:
@@ -137,7 +138,7 @@ class MusclesProblem:
             assert law is not None  # without contact no pair may touch
             at = called(one, "free"), called(other, "free")
             removed = relaxed if self._near_at_rest(one, other) else None
-            touching.append(Touching(*at, law.stiffness, law.smoothing, law.friction, removed))
+            touching.append(Touching(*at, law.stiffness, law.smoothing, law.friction, removed, law.friction is None))
         return join(bodies, tuple(touching))
 
     def _near_at_rest(self, one: str, other: str) -> bool:
@@ -160,16 +161,8 @@ class MusclesProblem:
         )
 
 
-def _surfaces(parts: Sequence[Surface]) -> Surface:
-    starts = np.cumsum([0, *(len(one.points) for one in parts)])
-    triangles = [one.triangles + start for one, start in zip(parts, starts, strict=False)]
-    return Surface(np.concatenate([one.points for one in parts]), np.concatenate(triangles))
-
-
-def _meshes(parts: Sequence[TetMesh]) -> TetMesh:
-    starts = np.cumsum([0, *(len(one.points) for one in parts)])
-    tets = [one.tets + start for one, start in zip(parts, starts, strict=False)]
-    return TetMesh(np.concatenate([one.points for one in parts]), np.concatenate(tets), maker=parts[0].maker)
+def _surfaces(parts: Iterable[Setup]) -> Surface:
+    return Surface(*united([(one.surface.points, one.surface.triangles) for one in parts]))
 
 
 def setup(case: MusclesCase) -> MusclesSetup:
@@ -251,9 +244,7 @@ def _instants(bone: Bone, frames: Sequence[int]) -> Floats:
 
 
 def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
-    """Decisions on each effect: an effect on all muscles is needed if any of them needs it, contact if muscles come near each
-    other.
-    """
+    """Decisions on each effect: an effect on all muscles is needed if any muscle needs it, contact if muscles come near."""
     found = [decisions(part, one) for part, one in zip(case.parts, rest.muscles.values(), strict=True)]
     every: list[Decision] = []
     for effect in case.effects:

@@ -54,9 +54,7 @@ def at_frames(built: MechanicalProblem, frames: tuple[int, ...]) -> MechanicalPr
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
-    """Decisions on the effects that a case needs, with reasons, from the set-up made by ``rest`` or a new set-up; empty for a
-    field.
-    """
+    """Decisions on the effects that a case needs, with reasons, from the set-up by ``rest`` or a new set-up; empty for a field."""
     if not isinstance(case, MuscleCase | MusclesCase):
         return ()
     known = setup(case) if rest is None else rest()

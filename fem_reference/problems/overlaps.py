@@ -70,9 +70,7 @@ def _crossing(surface: Surface) -> Ints:
 
 
 def longest_edge(mesh: Cells, law: Touching) -> float:
-    """The length [mm] of the longest edge at rest of facets of a ``law``: contact points are at most a quarter of this length
-    apart.
-    """
+    """The longest edge [mm] at rest of facets of a ``law``: contact points are at most a quarter of this length apart."""
     corners = (mesh.points[mesh.facets[name]] for name in (law.one, law.other))
     return max(float(edge_lengths(one).max()) for one in corners)
 

@@ -94,9 +94,8 @@ def check(body: Body) -> None:
         share = at.share(region)
         if not (share.min() >= 0 and share.max() <= 1):
             raise InputError(f"regions: {region}", f"shares from {share.min():g} to {share.max():g}", "from 0 to 1")
-        if (
-            isinstance(effect := body.effects[i], Load) and effect.on in body.mesh.facets
-        ):  # a membrane has its shares at corners
+        # A membrane has its shares at corners.
+        if isinstance(effect := body.effects[i], Load) and effect.on in body.mesh.facets:
             corners = body.points_on(effect.on)
             share = State(F=(), regions=body.shares(corners, np.zeros(len(corners), int))).share(region)
         if (most := float(share.max(initial=0.0))) < _REACHED:

@@ -25,7 +25,7 @@ NONE: Shares = MappingProxyType({})
 
 # The greatest number of sampled tetrahedra, evenly spread, and of places evaluated at once, so that their jets fit into a cache.
 _MOST, AT_ONCE = 2048, 1024
-_SMALLEST = 0.05  # the least det F of sampled tetrahedra: curved ones may be inverted between their corners
+_SMALLEST = 0.05  # the least det F of sampled tetrahedra: curved tetrahedra may be inverted between their corners
 
 
 def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float = 0.0) -> Floats:
@@ -96,9 +96,7 @@ class StressSamples:
 
 
 def _added(acting: Acting, one: tuple[Effect, float], now: Floats, stress: Callable[[Acting], Floats]) -> Floats:
-    """The change of the stress ``now`` (n, 3, 3) by an effect: for an energy, the stress of this energy with the prestrains of
-    ``acting``.
-    """
+    """The change of the stress ``now`` (n, 3, 3) by an effect: for an energy, its stress with the prestrains of ``acting``."""
     if isinstance(one[0], Energy):
         return stress([*(other for other in acting if isinstance(other[0], Prestrain)), one])
     return stress([*acting, one]) - now if isinstance(one[0], Prestrain) else np.zeros(now.shape)

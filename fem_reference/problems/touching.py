@@ -21,7 +21,8 @@ class Touching:
     points of either part and the present surface of the other. Under pressure p the parts overlap by p / k. ``friction``: the
     coefficient of Coulomb's law, as in ``ContactLaw``; None without friction. ``relaxed``: two frame numbers over which an overlap
     at rest is removed, as with bones. If None, an overlap of two parts presses at once, and an overlap of a part with itself only
-    after it has opened.
+    after it has opened. ``around``: True where points of either part also feel the skin around the other, such as that of
+    attachments, which has no points of its own; otherwise a point that slides past the other's rim ends the run.
     """
 
     one: str
@@ -30,6 +31,7 @@ class Touching:
     smoothing: float
     friction: float | None = None
     relaxed: tuple[float, float] | None = None
+    around: bool = False
 
     @property
     def forces(self) -> tuple[str, str]:

@@ -15,7 +15,7 @@ from fem_reference.io.texts import finite, plain
 from fem_reference.report.drawings import Drawing, colour_of, drawn
 from fem_reference.report.pages import Page
 
-COMMON = (0.0, 57.0)  # flexion of the hip [deg] that every case goes through
+COMMON = (0.0, 57.0)  # flexion of the hip [deg] that every case completes
 GRADES = {
     "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract; no part of the "
     "model is from memory",

@@ -133,9 +133,7 @@ def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], 
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
-    """Add a legend above, in as many columns as fit. The mark of values that are not a number is last. Beyond three rows the figure
-    grows.
-    """
+    """Add a legend above in as many columns as fit, with the mark of NaN last; beyond three rows the figure grows."""
     entries = sorted(zip(*axes.get_legend_handles_labels(), strict=True), key=lambda entry: entry[1] == NOT_A_NUMBER)
     handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
     lengths = [len(label) + 7 for label in labels]

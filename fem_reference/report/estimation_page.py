@@ -118,9 +118,8 @@ def _blobs() -> Drawing:
         for i, apart in enumerate(_APART):
             axes.contour(*two_blobs(apart), levels=[0.0], colors=[colour_of(i + 1)])
             axes.plot([], [], color=colour_of(i + 1), label=f"{apart:g} radii apart")
-        axes.set(
-            aspect="equal", xlabel="radii", ylabel="radii", ylim=(-1.5, 0.9)
-        )  # leaves room for the legend below the curves
+        # The limits leave room for the legend below the curves.
+        axes.set(aspect="equal", xlabel="radii", ylabel="radii", ylim=(-1.5, 0.9))
         axes.legend(fontsize="x-small", loc="lower center", ncols=2)
 
     return drawn("estimation-blobs", "Two Gaussians, one surface or two (Figure 7.1)", (4.6, 4.0), draw)

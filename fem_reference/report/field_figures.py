@@ -204,7 +204,7 @@ class _Window:
 
 
 def _windows(points: Floats, anchors: Floats) -> list[_Window]:
-    """The windows: the whole surface, the belt about its mean height, and the part about its anchors (k, 3)."""
+    """The windows: the entire surface, the belt about its mean height, and the part about its anchors (k, 3)."""
     height, extent = float(np.ptp(points[:, 1])), float(np.ptp(points, axis=0).max())
     windows = [_Window("whole", points.min(axis=0), points.max(axis=0), 0.0)]
     belt = points[np.abs(points[:, 1] - points[:, 1].mean()) < 0.1 * height]

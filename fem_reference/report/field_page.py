@@ -1,4 +1,4 @@
-"""The page of scalar examples beside the report's section 4.6."""
+"""The page of scalar examples, compared with section 4.6 of the report."""
 
 import tomllib
 from pathlib import Path

@@ -34,9 +34,7 @@ def facts(found: Recommendation, metric: str) -> dict[str, object]:
 
 
 def text(found: Recommendation, case: str, metric: str, unit: str, limit: float) -> str:
-    """The setting, or the setting nearest to the ``limit`` of the error, with its error in a ``unit``, its time and its
-    evidence.
-    """
+    """The setting, or that nearest to the ``limit`` of the error, with its error in a ``unit``, its time and its evidence."""
     alike = "the studied case" if len(found.of) == 1 else "the studied cases"
     measured = "measured on it" if found.measured else f"expected from {listed(list(found.of))}, {alike} most like it"
     one, lines = found.best or found.nearest, list[str]()

@@ -29,7 +29,7 @@ def page(found: Standings) -> Page:
 
 
 def text(found: Standings) -> str:
-    """The rows, the missing ones and the changes, as lines of text."""
+    """The rows, the missing rows and the changes, as lines of text."""
     lines = [_line(row) for case in found.cases for row in found.of(case)]
     lines += [f"{name}: left out, {why}" for name, why in found.missing.items()]
     return "\n".join([*lines, *(f"changed: {line}" for line in found.changes)])

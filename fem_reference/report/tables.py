@@ -97,9 +97,7 @@ def inversion(run: Run) -> tuple[Measure, ...]:
 
 
 def exerted(run: Run) -> tuple[Measure, ...]:
-    """The forces [N] and moments about the origin [N mm] on each bone that a solver recorded, as measures: their magnitudes, by the
-    name of the bone, and their components.
-    """
+    """The recorded forces [N] and moments about the origin [N mm] on each bone, as measures: magnitudes by bone, and components."""
     found = list[Measure]()
     for kind, unit in {"force_on_": "N", "moment_on_": "N mm"}.items():
         parts = {name.removeprefix(kind): values for name, values in run.scalars.items() if name.startswith(kind)}

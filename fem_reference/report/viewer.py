@@ -98,9 +98,8 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
     """The object that the module's docstring describes, for the runs ``shown``, the reference first."""
     reference, numbers = comparison.reference, comparison.reference.numbers[::every]
     frames = {run.name: _frames(run, numbers) for run in shown}
-    own = np.concatenate(
-        [reference.surface.points[None], frames[reference.name]]
-    )  # not empty, even if no frame was reached
+    # Not empty, even if no frame was reached.
+    own = np.concatenate([reference.surface.points[None], frames[reference.name]])
     box = _box(own, list(frames.values()))
     fields = Fields(comparison, shown, numbers)
     runs, top = _runs(frames, reference.name, box)

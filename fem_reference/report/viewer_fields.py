@@ -53,7 +53,7 @@ class Fields:
 
     @cached_property
     def lines(self) -> tuple[Polylines, NDArray[np.int64]]:
-        """The fibres that are drawn, and the indices of their points."""
+        """The drawn fibres, and the indices of their points."""
         offsets = self.context.fibres.offsets
         chosen = np.unique(np.linspace(0, len(offsets) - 2, min(FIBRES, len(offsets) - 1)).round().astype(int)).tolist()
         spans = [(offsets[i], offsets[i + 1]) for i in chosen]
@@ -145,9 +145,8 @@ class Fields:
         rest = lengths(lines.points)
         stretches = np.concatenate([np.ones(1), *((lengths(own) / rest).ravel() for own in points)])
         known = stretches[np.isfinite(stretches)]
-        low, high = (
-            float(np.percentile(known, share)) for share in (0.1, 99.9)
-        )  # so that no single piece sets the scale
+        # Percentiles, so that no single piece sets the scale.
+        low, high = (float(np.percentile(known, share)) for share in (0.1, 99.9))
         scale = {"low": min(low, 1.0), "high": max(high, 1.0)}
         return {"lines": np.diff(ends).tolist(), "rest": np.round(rest, 5).tolist(), **scale}
 
@@ -171,11 +170,6 @@ def arrows(run: Run, setup: Setup, numbers: tuple[int, ...]) -> list[list[list[f
         if number in numbers and (pull := forces.block(run, setup, i)) is not None:
             found[number] = np.round(np.hstack([pull.points, pull.of_points["force"]]), 4).tolist()
     return [found.get(number, []) for number in numbers]
-
-
-def _spread(first: int, end: int) -> NDArray[np.int64]:
-    """At most ``POINTS`` indices from ``first`` up to ``end``, both ends among them."""
-    return np.unique(np.linspace(first, end - 1, min(POINTS, end - first)).round().astype(np.int64))
 
 
 @np.errstate(invalid="ignore")

@@ -48,9 +48,7 @@ def code_hash(solver: str, package: Path = PACKAGE) -> str:
 
 
 def sources(solver: str, package: Path = PACKAGE) -> set[Path]:
-    """The files that determine the runs of ``solver``: packages that make problems, and the solver's modules with all their
-    imports.
-    """
+    """The files that determine the runs of ``solver``: packages that make problems, and its modules with all their imports."""
     found = {path for name in _BEFORE for path in _files(package / name)}
     waiting = _module(package, ["solvers", solver]) | {path for path in found if path.suffix == ".py"}
     while waiting:
@@ -91,9 +89,7 @@ def machine() -> str:
 
 
 def made_with(manner: str = "") -> dict[str, str]:
-    """Provenance of a measurement: our version, the machine, the ``manner`` in which runs used the machine, and versions of
-    packages.
-    """
+    """Provenance of a measurement: our version, the machine, the ``manner`` of its use by runs, and versions of packages."""
     described = ", ".join(filter(None, [machine(), manner]))
     return {"fem_reference": __version__, "machine": described, **versions()}
 

@@ -100,9 +100,8 @@ class Results:
         return {name: np.concatenate([part[name] for part in parts]) for name in wanted}
 
     def energies(self, frame: float) -> dict[str, float]:
-        """The energy [N mm] of each effect that has an energy, by its name in scene files, at one of the frame numbers ``frames``.
-        The share of an effect in a moment is minus the derivative of its energy with respect to the angle. Contact and springs are
-        left out.
+        """The energy [N mm] of each effect that has one, by its name in scene files, at one of the frame numbers ``frames``. An
+        effect's share of a moment is minus the slope of its energy in the angle. Contact and springs are left out.
         """
         state, (rule, shares), found = self._state(frame), _rule(), dict[str, float]()
         acting = [(effect, effect.amount(frame)) for effect in self.effects]
@@ -291,10 +290,8 @@ def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats
         return barycentric, gradients
     nodes = reference_nodes("tetrahedron", 2)
     near = np.column_stack([1 - nodes.sum(axis=1), nodes]) > 0
-    i, j = (
-        near.argmax(axis=1),
-        3 - near[:, ::-1].argmax(axis=1),
-    )  # the two corners on either side of each node; for a corner, the corner twice
+    # The two corners on either side of each node; for a corner, the corner twice.
+    i, j = near.argmax(axis=1), 3 - near[:, ::-1].argmax(axis=1)
     at_corner, scale = np.where(i == j, 1.0, 0.0), np.where(i == j, 2.0, 4.0)
     one, other = barycentric[:, i], barycentric[:, j]
     slopes = scale[:, None] * (one[..., None] * gradients[:, j] + other[..., None] * gradients[:, i])

@@ -133,9 +133,7 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
 
 
 def read_arrays(path: Path, names: tuple[str, ...] = (), also: tuple[str, ...] = ()) -> Arrays:
-    """The arrays ``names`` (by default all) of an .npz file, and any arrays of ``also`` that exist; InputError if the file is
-    damaged.
-    """
+    """The arrays ``names`` (by default all) of an .npz file, and any of ``also`` that exist; InputError if the file is damaged."""
     try:
         with path.open("rb") as file:
             with zipfile.ZipFile(file) as members:

@@ -133,7 +133,7 @@ class Run:
 
     @property
     def points(self) -> Floats:
-        """The vertices (n, d) of a field, else those of the surface at rest (n, 3) [mm]."""
+        """The vertices (n, d) of a field, else the vertices of the surface at rest (n, 3) [mm]."""
         return self.surface.points if self.mesh is None else self.mesh.points
 
     @property

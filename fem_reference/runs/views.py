@@ -1,4 +1,6 @@
-"""Frames and runs of one of several muscles, taken from the common ones. Scalars of a muscle begin with its name and a dot."""
+"""Frames and runs of one of several muscles, taken from the frames and runs of all. Scalars of a muscle begin with its name and a
+dot.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -25,9 +27,7 @@ _OF_ALL = (
 
 
 def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
-    """The part of a ``frame`` of several muscles for one muscle; a force on it by one of the ``others`` has the name of that
-    muscle.
-    """
+    """The part of a ``frame`` of several muscles for one muscle; a force on it by one of the ``others`` has the other's name."""
     assert frame.surface is not None  # frames of the reference have one
     assert frame.fibres is not None
     forces, moments = (

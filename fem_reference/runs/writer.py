@@ -150,9 +150,8 @@ class Writer:
             write(self.folder / names[-1][1])
             files.write_pvd(self.folder / f"{part}.pvd", names)
         for name, value in (dict.fromkeys(self.state["scalars"], math.nan) | frame.scalars).items():
-            unknown: list[float | None] = [None] * (
-                len(self.state["numbers"]) - 1
-            )  # unknown in frames that were stored before an effect was added
+            # Unknown in frames that were stored before an effect was added.
+            unknown: list[float | None] = [None] * (len(self.state["numbers"]) - 1)
             self.state["scalars"].setdefault(name, unknown).append(value if math.isfinite(value) else None)
         self._write_state()
         self._log_progress(frame)

@@ -1,4 +1,4 @@
-"""The keys and behaviour of every case; cases of muscles and of scalar fields add keys of their own.
+"""The keys and behaviour of every case; cases of muscles and of scalar fields add further keys.
 
 ``Case.key`` identifies a case by everything that determines its solution, including the content of its files.
 """
@@ -197,7 +197,7 @@ class Case(Record):
 
     @property
     def decides(self) -> list[Any]:
-        """Everything that decides verdicts: what determines solutions, and the judged solvers with settings that change results."""
+        """Everything that affects verdicts: the causes of solutions, and the judged solvers with settings that change results."""
         judged = {entry.of for entry in self.expect}
         others = [one for one in self.candidate if judged & {one.name, "candidates"}]
         solved = [

@@ -238,9 +238,7 @@ class Frames(Record):
 
 
 class Uncertain(Range):
-    """The range of a number of the case by its ``key``, such as ``effect[0].mu``. The range replaces the range stated by the
-    effect.
-    """
+    """The range of a number of the case by its ``key``, such as ``effect[0].mu``, instead of the range stated by the effect."""
 
     key: str
 

@@ -59,7 +59,7 @@ class MusclesCase(DrivenCase):
 
     @property
     def acting(self) -> dict[str, Effect]:
-        """The effects by their names; the name of an effect on one muscle follows that of the muscle."""
+        """The effects by their names; the name of an effect on one muscle follows the name of the muscle."""
         own = {f"{muscle.name}: {one.title}": one for muscle in self.muscle for one in muscle.effect}
         return {one.title: one for one in self.effect} | own
 
@@ -73,9 +73,7 @@ class MusclesCase(DrivenCase):
         }
 
     def determining(self) -> dict[str, Any]:
-        """The keys that determine the solution, without expectations; also ``apart``, if the second check tests whether muscles
-        cross although no effect shows this.
-        """
+        """The keys that determine the solution, without expectations; and ``apart``, which the second check uses."""
         tables = super().determining()
         checked = {"apart": True} if self.apart and self.touching is None else {}
         own = [{key: own for key, own in one.items() if key != "expect"} for one in tables["muscle"]]
@@ -105,9 +103,7 @@ class MusclesCase(DrivenCase):
             raise InputError(join(self.place, key), error.got, error.want) from error
 
     def _key(self, i: int, key: str) -> str:
-        """The key in the scene for a ``key`` in the case of muscle number ``i``, where effects on all muscles precede the effects
-        on this one.
-        """
+        """The key in the scene for a ``key`` in the case of muscle number ``i``, where effects on all muscles come first."""
         own, name = f"muscle[{i}].", key.partition(".")[0].partition("[")[0]
         shared = [k for k, one in enumerate(self.effect) if not isinstance(one, MuscleContact)]
         if match := re.match(r"effect\[(\d+)\]", key):
@@ -145,7 +141,7 @@ def with_muscles[C: DrivenCase](case: C, change: Callable[[Muscle], Mapping[str,
 
 
 def exactly_attached[C: DrivenCase](case: C) -> C:
-    """The case with exact attachments in place of springs."""
+    """The case with exact attachments instead of springs."""
 
     def exact(one: DrivenCase | Muscle) -> dict[str, object]:
         if not isinstance(one, MuscleCase | MuscleOfSeveral):

@@ -16,7 +16,7 @@ _Nodes = Annotated[
 
 
 class Interval(Record):
-    """``count`` nodes from ``start`` to ``end``, both included; with a ``seed`` the inner ones are at random positions."""
+    """``count`` nodes from ``start`` to ``end``, both included; with a ``seed`` the inner nodes are at random positions."""
 
     start: float
     end: float

@@ -1,6 +1,6 @@
 """Solvers: one file or folder each, named as in scene files.
 
-A file lists what it offers in ``SOLVES``: a ``MuscleSolver``, a ``FieldSolver``, a ``BodySolver``, or more than one of them
+A file lists its offers in ``SOLVES``: a ``MuscleSolver``, a ``FieldSolver``, a ``BodySolver``, or several of them
 (``common.protocol``; the contract is tests/contracts/test_every_solver.py).
 """
 
@@ -20,9 +20,8 @@ __all__ = ["check", "choice", "find", "in_table", "names", "offers", "settings",
 
 def names(task: Task | None = None) -> list[str]:
     """The names of all solvers in scene files, or of those for a ``task``."""
-    found = [
-        name for name in modules.names(__path__) if name != "common" and not name.endswith("_kernels")
-    ]  # modules that are no solvers but serve them
+    # Without modules that serve solvers but are none.
+    found = [name for name in modules.names(__path__) if name != "common" and not name.endswith("_kernels")]
     return [name for name in found if task is None or any(offer.task == task for offer in offers(name))]
 
 
@@ -44,7 +43,7 @@ def find(name: str, place: str, task: Literal["solve_body"]) -> BodySolver[Any]:
 @overload
 def find(name: str, place: str, task: Task) -> Solver[Any, Any]: ...
 def find(name: str, place: str, task: Task = "solve") -> Solver[Any, Any]:
-    """The solver ``name`` for a ``task``; InputError at ``place`` where there is none."""
+    """The solver ``name`` for a ``task``; InputError at ``place`` if there is none."""
     if name not in names():
         raise InputError(join(place, "solver"), f'"{name}"', f"one of {', '.join(names(task))}")
     for offer in offers(name):
@@ -66,7 +65,7 @@ def in_table(kind: str | None = None) -> tuple[Candidate, ...]:
 
 
 def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
-    """The name of a run and the settings for ``name``, a solver or a candidate: those of the case's own candidate, else of the page
+    """The name of a run and the settings for ``name``, a solver or a candidate: from the case's candidate, else from the page
     table-5-1, else the solver's defaults.
     """
     own = [one for one in case.candidate if one.solver == name] + [one for one in case.candidate if one.name == name]
@@ -82,7 +81,7 @@ def takes_effects(name: str) -> bool:
 
 
 def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str, task: Task = "solve") -> None:
-    """Raise InputError below ``place`` where ``settings`` do not suit the ``effects``."""
+    """Raise InputError below ``place`` if ``settings`` do not suit the ``effects``."""
     offer = find(name, place, task)
     if isinstance(offer, MuscleSolver) and offer.check_effects is not None:
         offer.check_effects(settings, effects, place)

@@ -2,9 +2,9 @@
 
 Frame number n is the state with the bones in their pose of frame n. Attached vertices move with their bone exactly. From the
 previous state, the method alternates between the rotations of all cells (local step) and the positions of free vertices (global
-step). Where the rows of attached vertices are removed and the weight of an edge is the same from both ends, both steps minimise eq.
-5.10, each over its own unknowns, so that the energy never rises. Negative weights do not change this, as the matrix is still
-that of linear elements, which is positive. Attachments by springs are exact here, and there is no contact.
+step). If the rows of attached vertices are removed and the weight of an edge is the same from both ends, both steps minimise eq.
+5.10, each over its own unknowns, so the energy never rises. Negative weights do not change this, as the matrix is still the
+positive matrix of linear elements. Attachments by springs are treated as exact, and there is no contact.
 """
 
 from collections.abc import Callable
@@ -38,15 +38,15 @@ _NO_AREA = 1e-6
 class ArapSettings(Record):
     """The settings of the alternation; every key but ``tolerance`` is required.
 
-    ``weights`` of edges: "cotangent" (eq. 5.13), "clamped cotangent" (negative ones set to 0), "kirchhoff" (all 1), "tutte"
-    (kirchhoff, each row divided by its diagonal). A cotangent weight is negative where the angles opposite its edge sum to more
-    than pi. If such weights are kept, as in libigl, a half turn of a cell may lower the energy, so that rest is unstable.
-    ``fixed``: the rows and columns of attached vertices are removed ("remove"), or only the columns, and all rows are solved by
-    least squares ("ols", eq. 5.12). With removed rows, tutte gives the same states as kirchhoff.
-    ``rotations``: fitted before "each" global step, or once in a frame ("first only"): later iterations then change nothing.
-    ``volume_step``: after each global step the free vertices are scaled about the mean of all by eq. 5.9.
-    ``iterations``: in each frame; without a ``tolerance`` their number determines the result. With a ``tolerance`` [mm] a frame
-    ends as soon as no vertex moves farther in an iteration; a run with a frame that needs more iterations is out of steps.
+    ``weights`` of edges: "cotangent" (eq. 5.13), "clamped cotangent" (negative weights set to 0), "kirchhoff" (all 1), "tutte"
+    (kirchhoff, each row divided by its diagonal). A cotangent weight is negative if the angles opposite its edge sum to more than
+    pi. If such weights are kept, as in libigl, a half turn of a cell may lower the energy, so rest is unstable. ``fixed``: the rows
+    and columns of attached vertices are removed ("remove"), or only the columns, and all rows are solved by least squares ("ols",
+    eq. 5.12). With removed rows, tutte gives the same states as kirchhoff. ``rotations``: fitted before "each" global step, or once
+    in a frame ("first only"): later iterations then change nothing. ``volume_step``: after each global step the free vertices are
+    scaled by eq. 5.9 about the mean of all vertices. ``iterations``: in each frame; without a ``tolerance`` their number determines
+    the result. With a ``tolerance`` [mm] a frame ends as soon as no vertex moves farther than this in an iteration; a run with a
+    frame that needs more iterations is out of steps.
     """
 
     weights: Weights
@@ -81,8 +81,9 @@ class GlobalStep:
     """The global step for given ``attached`` (k,) and ``free`` vertices (m,), factorised once.
 
     ``pick`` (m, n) multiplies both sides: it selects the rows of free vertices or, for least squares, is the transpose of their
-    columns. ``coupling`` (m, k): the columns of attached vertices, multiplied so. ``loose``: free vertices that no weights connect
-    to an attached one. If there are any, or if nothing or everything is attached, there is no ``factor``: free vertices stay.
+    columns. ``coupling`` (m, k): the columns of attached vertices, also multiplied. ``loose``: free vertices that no weights
+    connect to an attached vertex. If there are any, or if nothing or everything is attached, there is no ``factor``: free vertices
+    stay.
     """
 
     cells: VertexCells
@@ -106,7 +107,7 @@ class GlobalStep:
         return cls(cells, attached, free, pick, pick @ matrix[:, attached], factor, loose)
 
     def place(self, points: Floats, rotations: Floats) -> Floats:
-        """The global step: positions (n, 3) [mm] that solve ``L p' = b`` with the attached vertices where ``points`` has them."""
+        """The global step: positions (n, 3) [mm] that solve ``L p' = b`` with the attached vertices as in ``points``."""
         moved = points.copy()
         if self.factor is not None:
             right = self.pick @ right_side(rotations, self.cells) - self.coupling @ points[self.attached]
@@ -116,7 +117,7 @@ class GlobalStep:
 
 @dataclass(frozen=True, eq=False)
 class Relaxed:
-    """The ``points`` (n, 3) [mm] of a frame after ``iterations``; ``met``: True if they met the tolerance, if any; the trouble."""
+    """The ``points`` (n, 3) [mm] of a frame after ``iterations``; ``met``: True if the tolerance, if any, is met; the trouble."""
 
     points: Floats
     iterations: int
@@ -125,7 +126,7 @@ class Relaxed:
 
 
 class Alternation(MovingSurface):
-    """A surface whose free vertices ``relax`` after the attached ones have moved."""
+    """A surface whose free vertices ``relax`` after the attached vertices have moved."""
 
     advice = "a slower motion may help"
 
@@ -152,7 +153,7 @@ class Alternation(MovingSurface):
         return replace(super().frame(number), scalars={"arap_energy_mm2": energy})
 
     def ending(self) -> Outcome:
-        """Out of steps where a frame did not meet the tolerance."""
+        """Out of steps if a frame did not meet the tolerance."""
         frames = self.setup.frames[-1] - self.setup.frames[0]
         done = f"{frames} frames in {self.cost['local_global_steps']:.0f} iterations"
         if missed := self.cost["frames_off_tolerance"]:
@@ -197,10 +198,9 @@ def alternate[S: Record](make: Callable[[Setup, S], Alternation], setup: Setup, 
 
 
 def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:
-    """``points`` (n, 3) with the ``free`` ones scaled about the mean of all by the cube root of V0 / V, eq. 5.9.
-
-    V0 is ``volume`` [mm3]. It is reached only if all vertices are free, as attached vertices stay in place. A surface that encloses
-    no volume is not changed.
+    """``points`` (n, 3) with the ``free`` points scaled about the mean of all by the cube root of V0 / V, eq. 5.9. V0 is ``volume``
+    [mm3], which is reached only if all vertices are free, as attached vertices stay in place. A surface that encloses no volume is
+    not changed.
     """
     centre, inside = points.mean(axis=0), abs(enclosed_volume(points, triangles))
     factor = np.cbrt(volume / inside) if inside > 0 else 1.0
@@ -221,7 +221,7 @@ def factorised(matrix: Any) -> Any:
 
 
 def cotangents(points: Floats, triangles: Ints) -> Floats:
-    """Cotangent of the angle at each corner (m, 3), negative where it is obtuse; 0 in a degenerate triangle."""
+    """Cotangent of the angle at each corner (m, 3), negative if the angle is obtuse; 0 in a degenerate triangle."""
     sides = [points[triangles[:, (k + 2) % 3]] - points[triangles[:, (k + 1) % 3]] for k in range(3)]
     doubled = np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)
     longest = np.max([np.einsum("ij,ij->i", side, side) for side in sides], axis=0)

@@ -18,7 +18,7 @@ _ROUNDING = 1e-17
 
 class VertexCells(NamedTuple):
     """The edges around each vertex i at ``rest`` (n, 3) [mm]: to ``neighbours[starts[i]:starts[i + 1]]``, with their ``weights``,
-    which need not be the same from both ends; ``starts`` (n + 1,), ``neighbours`` and ``weights`` (e,).
+    which may differ between the two ends; ``starts`` (n + 1,), ``neighbours`` and ``weights`` (e,).
     """
 
     rest: Floats
@@ -64,9 +64,9 @@ def _diagonalise(matrix: Floats, vectors: Floats) -> None:
 def _rotate(covariance: Floats, matrix: Floats, vectors: Floats, rotation: Floats) -> None:
     """The ``rotation`` R (3, 3), det R = 1, for which sum_ab R_ab C_ba is greatest; ``matrix``, ``vectors`` (4, 4) are scratch.
 
-    As a quaternion it is the eigenvector of the greatest eigenvalue of a 4 x 4 matrix made of C (Horn 1987,
-    doi:10.1364/JOSAA.4.000629). The report's singular value decomposition gives the same, except in cells that are flat or inside
-    out, where it gives a reflection.
+    As a quaternion the rotation is the eigenvector of the greatest eigenvalue of a 4 x 4 matrix made of C (Horn 1987,
+    doi:10.1364/JOSAA.4.000629). The report's singular value decomposition gives the same rotation, except in cells that are flat or
+    inside out, for which it gives a reflection.
     """
     C = covariance
     matrix[0, 0] = C[0, 0] + C[1, 1] + C[2, 2]
@@ -88,7 +88,7 @@ def _rotate(covariance: Floats, matrix: Floats, vectors: Floats, rotation: Float
 
 @compiled
 def fit_rotations(points: Floats, cells: VertexCells) -> Floats:
-    """The rotations (n, 3, 3) of the cells that bring their edges at rest nearest to those of ``points``.
+    """The rotations (n, 3, 3) of the cells that bring their edges at rest nearest to the edges of ``points``.
 
     The covariance is ``C = sum_j w_ij (p_i - p_j) (p'_i - p'_j)^T``: edges start at the vertex itself, as in Sorkine and
     Alexa 2007; with the centroids of the report's text the fit would no longer minimise eq. 5.10.
@@ -123,7 +123,7 @@ def right_side(rotations: Floats, cells: VertexCells) -> Floats:
 
 @compiled
 def energy(points: Floats, rotations: Floats, cells: VertexCells) -> float:
-    """``sum_i sum_j w_ij |(p'_i - p'_j) - R_i (p_i - p_j)|^2`` [mm2]: eq. 5.10 with the squares of its source."""
+    """``sum_i sum_j w_ij |(p'_i - p'_j) - R_i (p_i - p_j)|^2`` [mm2]: eq. 5.10 with the squares as in its source."""
     found = 0.0
     for i in range(len(cells.rest)):
         for at in range(cells.starts[i], cells.starts[i + 1]):

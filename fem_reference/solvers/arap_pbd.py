@@ -1,10 +1,10 @@
 """ARAP (as rigid as possible) with position based dynamics: the two combinations that report 6.2 and 7.2 propose.
 
-*The volume as a constraint* of the ARAP energy, in place of a scaling after each step: the positions of a global step solve
-``L p' = b + lambda grad V``. The gradient is taken at the previous iteration, and the multiplier lambda is such that the enclosed
-volume is that at rest. At convergence, the gradient of the energy is a multiple of that of the volume. *ARAP as initial guess*:
-sweeps of PBD's projections (edge lengths, volume, dihedral angles) start from the ARAP state of the frame; there are no velocities.
-If both are requested, the projections come last. As in ``arap``, there is no contact.
+*The volume as a constraint* of the ARAP energy, instead of a scaling after each step: the positions of a global step solve
+``L p' = b + lambda grad V``. The gradient is taken at the previous iteration, and the multiplier lambda is chosen so that the
+enclosed volume is the volume at rest. At convergence, the gradient of the energy is a multiple of the gradient of the volume. *ARAP
+as initial guess*: sweeps of PBD's projections (edge lengths, volume, dihedral angles) start from the ARAP state of the frame; there
+are no velocities. If both are requested, the projections come last. As in ``arap``, there is no contact.
 """
 
 from typing import Annotated
@@ -26,9 +26,9 @@ from fem_reference.solvers.pbd_kernels import volume
 
 # Newton's method for the volume stops at this relative error, or after this many steps.
 _REACHED, _STEPS = 1e-12, 20
-# A root counts as real if its imaginary part is at most this share of it.
+# A root counts as real if its imaginary part is at most this share of the root.
 _REAL = 1e-8
-# The volume counts as kept up to this relative error.
+# The volume counts as preserved up to this relative error.
 _KEPT = 1e-6
 
 
@@ -44,8 +44,8 @@ class Projections(Record):
 class ArapPbdSettings(Record):
     """ARAP with the rows of attached vertices removed and rotations fitted in each iteration; settings that keep its volume.
 
-    ``weights``, ``iterations`` and ``tolerance``: as in ``arap``; Tutte's are not offered, as with removed rows they give the
-    states of kirchhoff. ``volume_constraint``: minimise the energy at the volume of rest. ``projections``: none by default.
+    ``weights``, ``iterations`` and ``tolerance``: as in ``arap``; "tutte" is not offered, as with removed rows it gives the states
+    of "kirchhoff". ``volume_constraint``: minimise the energy at the rest volume. ``projections``: none by default.
     """
 
     weights: Symmetric
@@ -79,10 +79,9 @@ def _alternation(setup: Setup, settings: ArapPbdSettings) -> Alternation:
 
 
 def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest: PbdConstraints) -> Relaxed:
-    """Local and global steps from ``points`` (n, 3), as many as the settings demand, at the volume of ``rest`` if they demand it.
-
-    Diverged where the volume constraint moves a point from the minimum of a global step by more than the edge of a cube of that
-    volume: then the volume is kept only by folds, at another root of the cubic.
+    """Local and global steps from ``points`` (n, 3), as many as the settings require, at the volume of ``rest`` if required.
+    Diverged if the volume constraint moves a point from the minimum of a global step by more than the edge of a cube of that
+    volume: the volume is then preserved only by folds, at another root of the cubic.
     """
     count, met, tolerance = 0, False, settings.tolerance
     while count < settings.iterations and not met:
@@ -100,7 +99,7 @@ def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest
 
 
 def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdConstraints) -> Floats:
-    """``p + lambda L^-1 grad V``, with the lambda nearest to 0 at which the volume is that of ``rest``.
+    """``p + lambda L^-1 grad V``, with the lambda nearest to 0 at which the volume equals the volume of ``rest``.
 
     p is the ``minimum`` (n, 3) of the global step, and the gradient is taken at the positions ``before`` it. The volume is a cubic
     in lambda; Newton's method refines its root nearest to 0. Without a root the minimum is returned.
@@ -124,8 +123,8 @@ def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdCons
 def least_root(points: Floats, direction: Floats, rest: PbdConstraints) -> float | None:
     """The lambda nearest to 0 at which ``points + lambda direction`` (n, 3) have the volume of ``rest``, None if there is none.
 
-    Six times the volume is a cubic form: its coefficients are values and slopes at ``points`` and at ``direction``. It is solved
-    for ``1 / lambda``, as this stays accurate where the cubic term nearly vanishes.
+    Six times the volume is a cubic form: its coefficients are values and slopes at ``points`` and at ``direction``. The cubic is
+    solved for ``1 / lambda``, which stays accurate if the cubic term nearly vanishes.
     """
     (value, slope), (cubic, slope_of_direction) = volume(points, rest.triangles), volume(direction, rest.triangles)
     off = value - rest.six_volumes

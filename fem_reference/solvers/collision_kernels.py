@@ -1,10 +1,10 @@
 """Contact of vertices with bones, as constraints ``C = distance - allowed >= 0``. Report section 6.1.1.
 
-The distance to a bone is computed only for the vertices that may be near it. A distance changes by at most the displacement, so a
-vertex whose displacement relative to the bone is less than its last distance is still outside. Only vertices are checked, at the
-places that they reach and not on the path there: a sharp edge may pass between them, and a vertex that goes through a thin bone in
-one step comes out on the other side. The distance to a bone of triangles is stored on a grid along the axes at rest, so results
-depend on the axes: with the whole scene rotated, vertices of the case hip_flexion by ``pbd`` differ by up to 1.2 mm (mean 0.1 mm).
+The distance to a bone is computed only for vertices that may be near the bone. A distance changes by at most the displacement, so a
+vertex whose displacement relative to the bone is less than its last distance is still outside. Only vertices are checked, at their
+new positions and not on the path: a sharp edge may pass between them, and a vertex that goes through a thin bone in one step comes
+out on the other side. The distance to a bone of triangles is stored on a grid along the axes at rest, so results depend on the
+axes: if the entire scene is rotated, vertices in the case hip_flexion by ``pbd`` differ by up to 1.2 mm (mean 0.1 mm).
 """
 
 import math
@@ -27,9 +27,7 @@ Four = tuple[float, float, float, float]
 
 
 class Contacts(NamedTuple):
-    """The checked vertices (k,), their values of the constraint (k,) [mm], and the unit vectors (k, 3) along which these
-    increase.
-    """
+    """The checked vertices (k,), the values of their constraint (k,) [mm], and unit vectors (k, 3) along which they increase."""
 
     vertices: Ints
     value: Floats
@@ -96,8 +94,8 @@ def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats)
 
 @compiled
 def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) -> tuple[Ints, Floats]:
-    """Indices (k,) and positions (k, 3) of those ``points`` (n, 3) that are ``clear`` (n,) [mm] or farther from their places at the
-    last check, ``asked_at`` (n, 3), all in the rest frame of a bone at ``pose``.
+    """Indices (k,) and positions (k, 3) of the ``points`` (n, 3) at a distance of ``clear`` (n,) [mm] or more from their places at
+    the last check, ``asked_at`` (n, 3), all in the rest frame of a bone at ``pose``.
     """
     found, places = np.empty(len(points), np.int64), np.empty_like(points)
     count = 0
@@ -116,10 +114,8 @@ def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) ->
 
 
 class CollidingBone:
-    """A bone, the distance that it allows each vertex, and the last known distances.
-
-    A vertex may come as near as ``gap`` [mm], or as it is at rest where that is nearer, so that nothing jumps at the first step.
-    Vertices that are not ``free`` (n,) are never checked.
+    """A bone, its allowed distance from each vertex, and the last known distances. A vertex may come as near as ``gap`` [mm], or as
+    at rest if that is nearer, so that nothing jumps at the first step. Vertices that are not ``free`` (n,) are never checked.
     """
 
     def __init__(self, bone: Bone, rest: Floats, free: NDArray[np.bool_], gap: float) -> None:

@@ -1,8 +1,8 @@
-"""A solver of your own as a command: it reads the scene from one folder and writes its frames into another one.
+"""Your own solver as a command: it reads the scene from one folder and writes its frames into another folder.
 
 The command is started without a shell, once for each run. ``{scene}`` stands for the folder with the scene, as ``export`` writes
-it, ``{out}`` for an empty folder that the frames go into, and other names in braces for settings. A scene file cannot choose
-this solver: it would run a program.
+it, ``{out}`` for an empty folder for the frames, and other names in braces for settings. A scene file cannot choose this solver, as
+it would run a program.
 """
 
 import hashlib
@@ -45,10 +45,10 @@ Value = int | float | str
 class CommandSettings(Record):
     """The command, and the value of each setting in it.
 
-    ``unit``: the unit of length of its frames, by default that of a ``candidate.toml`` beside them, otherwise mm. ``version``:
-    that of the program. ``files``: further files and folders that determine its results, besides those in the command. ``moves``:
-    the mesh with its unknowns. ``time_limit``: the limit of processor time. ``directory``: its working directory. ``ladder``:
-    useful values of settings, from the fastest to the most accurate.
+    ``unit``: the unit of length of its frames, by default the unit in a ``candidate.toml`` beside them, otherwise mm. ``version``:
+    the version of the program. ``files``: further files and folders that determine its results, besides those in the command.
+    ``moves``: the mesh with its unknowns. ``time_limit``: the limit of processor time. ``directory``: its working directory.
+    ``ladder``: useful values of settings, from the fastest to the most accurate.
     """
 
     model_config = ConfigDict(protected_namespaces=())
@@ -63,7 +63,7 @@ class CommandSettings(Record):
 
     @property
     def place(self) -> Path:
-        """The folder that it runs in."""
+        """The folder in which the program runs."""
         return Path(self.directory).absolute()
 
     @computed_field  # type: ignore[prop-decorator]
@@ -97,7 +97,7 @@ def sources(settings: CommandSettings) -> list[Path]:
 
 
 def _filled(settings: CommandSettings, places: Mapping[str, Path]) -> list[str]:
-    """The words of the command with the values of its settings, and of the folders that have ``places``."""
+    """The words of the command with the values of its settings, and with the folders ``places``."""
     values = {key: str(value) for key, value in (*settings, *places.items())}
     words = shlex.split(settings.command)
     return [_PLACEHOLDER.sub(lambda found: values.get(found[1], found[0]), word) for word in words]
@@ -118,8 +118,8 @@ class Description(recorded.About):
 
 
 def choice(command: str, directory: Path, place: str) -> Candidate:
-    """The ``command``, which runs in a ``directory``, as a candidate; ``place`` names it in messages. It is described by the
-    ``candidate.toml`` beside the first of its files that has one, else by that in the directory.
+    """The ``command``, which runs in a ``directory``, as a candidate; ``place`` names it in messages. Its description is the
+    ``candidate.toml`` beside the first of its files that has one, else the file in the directory.
     """
     names = placeholders(command, place)
     _check_program(command, directory, place)
@@ -188,10 +188,10 @@ def _check_named(key: str, names: tuple[str, ...], place: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class CommandSolver(MuscleSolver[CommandSettings]):
-    """The offer, whose settings are those that the command mentions."""
+    """The offer, with the settings that the command mentions."""
 
     def record(self, given: Mapping[str, Any], place: str) -> type[CommandSettings]:
-        """The record with a required key for each setting in the command; one with a ladder is marked as ``Trade``."""
+        """The record with a required key for each setting in the command; a setting with a ladder is marked as ``Trade``."""
         command, ladder = given.get("command"), given.get("ladder", {})
         if not isinstance(command, str) or not isinstance(ladder, Mapping):
             return self.settings  # this record then reports the error
@@ -207,7 +207,7 @@ class CommandSolver(MuscleSolver[CommandSettings]):
         return settings.moves
 
     def fills(self, settings: CommandSettings) -> bool:  # noqa: ARG002
-        """True: the scene that it reads has tetrahedra and fibres."""
+        """True: the scene for the program has tetrahedra and fibres."""
         return True
 
 
@@ -275,7 +275,7 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
 
 
 def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended) -> dict[str, float]:
-    """The time that the program states for solving its frames alone; InputError if that exceeds the time of its run."""
+    """The time that the program states for solving its frames alone; InputError if this exceeds the time of its run."""
     found = {} if said.threads is None else {"threads": float(said.threads)}
     if said.seconds_per_frame is None:
         return found

@@ -32,7 +32,7 @@ class _Compiled:
         if not can_keep(kept_code()):
             return numba.njit(error_model="numpy")(self.function)
         before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(kept_code())  # numba reads it here and never again for this function
+        numba.config.CACHE_DIR = str(kept_code())  # numba reads the setting here, and not again for this function
         try:
             return numba.njit(cache=True, error_model="numpy")(self.function)
         finally:
@@ -40,7 +40,7 @@ class _Compiled:
 
 
 def compiled[F: Callable[..., Any]](function: F) -> F:
-    """The function as machine code, made at its first call and kept on disk, where that can be written; it runs on one thread."""
+    """The function as machine code, made at its first call and kept on disk, if that can be written; it runs on one thread."""
     return cast(F, _Compiled(function))
 
 
@@ -61,7 +61,7 @@ def can_keep(folder: Path) -> bool:
 def kept_code() -> Path:
     """The folder where machine code of this version of the loops is kept; it may be deleted.
 
-    A compiled function contains those that it calls. numba checks only a function's own file for changes,
+    A compiled function contains the functions that it calls. numba checks only a function's own file for changes,
     so each version of all loops together has a folder.
     """
     digest = hashlib.sha256()

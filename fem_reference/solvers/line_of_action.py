@@ -1,8 +1,8 @@
 """Lines of action: each fibre of the scene as one line between its bones, straight, through via-points or around an obstacle.
 
-Report 5.1 to 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest. Between two fixed
-points it is as short as possible. It has a length, with ``hill`` also a force, and no surface: it is judged on these alone. A line
-goes around an obstacle on the shorter side: once its ends pass opposite points, it changes sides.
+Report 5.1 to 5.3. The ends of a line are the ends of the fibre, each fixed to the bone whose attachment is nearest at rest. Between
+two fixed points the line is as short as possible. A line has a length, with ``hill`` also a force, and no surface: only length and
+force are judged. A line goes around an obstacle on the shorter side: once its ends pass opposite points, it changes sides.
 """
 
 from itertools import pairwise
@@ -29,11 +29,11 @@ from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
 
 
 class LineSettings(Record):
-    """Points and obstacles that lines go through and around; without any key they are straight.
+    """Points through which and obstacles around which lines go; without any key lines are straight.
 
     ``via``: points in the order in which a fibre passes them. ``via_count``: instead, a number of points evenly spread over each
-    fibre, each on the bone of the nearer end. ``obstacle``: surfaces that each segment between two fixed points goes around,
-    where the straight path would cross them. ``hill``: forces of the lines.
+    fibre, each on the bone of the nearer end. ``obstacle``: surfaces around which each segment between two fixed points goes if the
+    straight path would cross them. ``hill``: forces of the lines.
     """
 
     via: tuple[Via, ...] = ()
@@ -49,7 +49,7 @@ class LineSettings(Record):
 
 
 class Shortest:
-    """The ``lines`` of a muscle, at any frame as short as the ``wraps`` let them be."""
+    """The ``lines`` of a muscle, at any frame as short as the ``wraps`` allow."""
 
     advice = "a smaller radius may help"
 
@@ -106,19 +106,17 @@ class Shortest:
 
 
 def solve(problem: MuscleProblem, settings: LineSettings, sink: Sink) -> Outcome:
-    """The lines at every requested frame, up to one with a fixed point inside an obstacle; InputError if that is the first."""
+    """The lines at every requested frame, up to a frame with a fixed point in an obstacle; InputError if this is the first."""
     return each(Shortest(problem, settings), problem.frames, problem.frames, sink)
 
 
 def check(settings: LineSettings, problem: MuscleProblem, place: str) -> None:
-    """Raise InputError below ``place`` where lines cannot have the points and obstacles of the settings."""
+    """Raise InputError below ``place`` if lines cannot have the points and obstacles of the settings."""
     _made(problem, settings, place)
 
 
 def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[Lines, Wraps]:
-    """The lines and the obstacles; InputError below ``place`` where the case lacks what they need, or a fixed point is inside an
-    obstacle at the first frame.
-    """
+    """The lines and the obstacles; InputError below ``place`` if they are impossible at the first frame."""
     lines, first = lines_of(problem, settings.via, settings.via_count, place), problem.frames[0]
     wraps = wraps_of(problem, settings.obstacle, place)
     name, inside = wraps.inside(lines.at(first).points, first)
@@ -128,7 +126,7 @@ def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[L
 
 
 def _lengths(passed: Passed, paths: Paths | Winding) -> Floats:
-    """The lengths (k,) [mm] of lines from those of their parts."""
+    """The lengths (k,) [mm] of lines from the lengths of their parts."""
     return np.asarray(paths.lengths.reshape(len(passed.points), -1).sum(axis=1))
 
 
@@ -137,7 +135,7 @@ def _on_bones(
 ) -> dict[str, float]:
     """The force [N] and, about the origin, the moment [N mm] on each bone by lines of these ``tensions`` (k,) [N].
 
-    A part pulls along itself at both of its ends; an obstacle bears the pulls of both sides, as the line on it has no weight.
+    A part pulls along itself at both of its ends; an obstacle bears the pulls of both sides, as the line has no weight.
     """
     fixed, on_bone = passed.points, passed.on
     pulls = np.repeat(tensions, fixed.shape[1] - 1)[:, None]

@@ -1,9 +1,9 @@
-"""The report's Octave listings (4.1 on an interval, 4.5 on triangles): what they compute, even where the report's text differs.
+"""The report's Octave listings (4.1 on an interval, 4.5 on triangles): their results, even if the report's text differs.
 
 Listings 4.1, 4.2, 4.4 and 4.5 are transcribed. Vertices are numbered from 0 here and from 1 there. ``bounds`` (2, m) is the
-listings' list of Dirichlet conditions: a row of vertices and a row of values. Lengths have any unit, or none: of the points of a
-mesh only the directions of its edges count. validation/octave has the listings as Octave runs them, their results, and the reading
-of each misprint.
+listings' list of Dirichlet conditions: a row of vertices and a row of values. Lengths have any unit, or none: only the directions
+of the edges of a mesh count. validation/octave has the listings as Octave runs them, their results, and the reading of each
+misprint.
 """
 
 import time
@@ -55,7 +55,7 @@ def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outco
 
 
 def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
-    """Raise InputError at ``place`` where the listing for the problem's domain lacks what the case or the settings request. Listing
+    """Raise InputError at ``place`` if the listing for the problem's domain lacks something that case or settings request. Listing
     4.1 has the conditions 0 at the first node and slope -1 at the last; listing 4.5 has values only.
     """
     points, fixed = problem.mesh.points, problem.fixed[: len(problem.mesh.points)]
@@ -74,8 +74,8 @@ def fem1d(nodes: Floats, peclet: float) -> Floats:
     """Listing 4.1 at given increasing ``nodes`` (n,): the solution (n,), 0 at the first node and of slope -1 / peclet at the last.
 
     ``diff_op = -peclet K`` with K the stiffness matrix of linear elements, and the source 1 is divided by ``peclet``: it
-    solves ``peclet psi'' = 1 / peclet``, ``peclet psi'(1) = -1``. On (0, 1), for any nodes, at the nodes, without error:
-    ``psi = x^2 / (2 peclet^2) - x (1 / peclet + 1 / peclet^2)``, which is eq. 4.10 at 1. It contains no advection.
+    solves ``peclet psi'' = 1 / peclet``, ``peclet psi'(1) = -1``. On (0, 1) the values at the nodes are exact for any nodes:
+    ``psi = x^2 / (2 peclet^2) - x (1 / peclet + 1 / peclet^2)``, which is eq. 4.10 at 1. There is no advection.
     """
     steps = np.diff(nodes)
     if len(steps) == 0 or not (steps > 0).all():
@@ -94,9 +94,9 @@ def fem1d(nodes: Floats, peclet: float) -> Floats:
 def first_derivative(triangles: Ints, points: Floats) -> Any:
     """Listing 4.2: the sparse matrix A (n dim, n dim) over ``triangles`` (m, 3) of ``points`` (n, dim), dim by dim for each vertex.
 
-    For every edge of every triangle, with d its direction: ``d d^T`` is added to the blocks of both its ends and taken from the
-    two blocks between them. A is no derivative: ``u^T A u = sum over edges of w (d . (u_s - u_t))^2`` is twice the energy of
-    springs along the edges, all of one stiffness whatever their length, w = 2 inside and 1 at the rim.
+    For every edge of every triangle, with d its direction: ``d d^T`` is added to the blocks of both its ends and subtracted from
+    the two blocks between them. A is no derivative: ``u^T A u = sum over edges of w (d . (u_s - u_t))^2`` is twice the energy of
+    springs along the edges, all of one stiffness for any length, w = 2 inside and 1 at the rim.
     """
     dim = points.shape[1]
     s, t = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
@@ -119,8 +119,8 @@ def first_derivative(triangles: Ints, points: Floats) -> Any:
 def dirichlet(A: Any, b: Floats, dim: int, bounds: Floats) -> tuple[Any, Floats]:
     """Listing 4.4: A (n dim, n dim) and b (n dim,) with every component of the vertices of ``bounds`` (2, m) set to their value.
 
-    Their columns go to the right side; then their rows and columns become those of the unit matrix. A vertex that is named twice
-    is an error: the listing would use its first value for the neighbours and its last for the vertex itself.
+    Their columns go to the right side; then their rows and columns become rows and columns of the unit matrix. A vertex that is
+    named twice is an error: the listing would use its first value for the neighbours and its last for the vertex itself.
     """
     vertices = bounds[0].astype(np.int64)
     if len(np.unique(vertices)) < len(vertices):
@@ -148,7 +148,7 @@ def fem2d(triangles: Ints, points: Floats, bounds: Floats) -> tuple[Floats, Floa
     is x. The listing draws -x.
 
     ``(26 A A + 2 A + 0.05) u = b`` with A of listing 4.2, positive semidefinite, on the side of minus a second derivative: of order
-    4, 2 and 0, where the text's ``26 psi'' + 2 psi' + 0.05 psi = f`` is of order 2, 1 and 0.
+    4, 2 and 0, while the text's ``26 psi'' + 2 psi' + 0.05 psi = f`` is of order 2, 1 and 0.
     """
     dim = points.shape[1]
     A = first_derivative(triangles, points)

@@ -1,9 +1,9 @@
 """A mass-spring system: report section 5.5.1, eqs 5.3 to 5.7.
 
 A volumetric model, as in Table 5.1: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses sample
-fibres and are joined to masses nearby; here the mesh defines the springs.) They carry the surface and the fibres. Springs resist
-neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is ignored. Contact acts on
-the masses of the surface only: the surface between them may be inside a bone.
+fibres and are joined to masses nearby; here the mesh defines the springs.) The masses carry the surface and the fibres. Springs
+resist neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is ignored. Contact
+acts on the masses of the surface only: the surface between them may be inside a bone.
 """
 
 import math
@@ -49,10 +49,10 @@ def _damping(text: object) -> float | str:
 class MassSpringSettings(Record):
     """Stiffness, mass and time of the muscle.
 
-    ``stiffness``: that of every spring. ``density``: that of the muscle. All masses are equal: equilibrium does not depend on
-    them, and a small one would make every time step small. ``frame_time``: the solver's own time from a frame number to the next;
-    the longer it is, the nearer the muscle comes to equilibrium. The scene's interval applies to the reference and to recorded
-    sequences. ``damping``: the coefficient c, or ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an
+    ``stiffness``: the stiffness of every spring. ``density``: the density of the muscle. All masses are equal: equilibrium does not
+    depend on masses, and a small mass would make every time step small. ``frame_time``: the solver's time from a frame number to
+    the next; the longer it is, the nearer the muscle is to equilibrium. The scene's interval applies to the reference and to
+    recorded sequences. ``damping``: the coefficient c, or ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an
     acceleration, by default none. ``collision``: contact with bones at every step, by default none. ``time_step``: the longest
     allowed step, by default a stable one.
     """
@@ -85,21 +85,21 @@ def network_of(mesh: TetMesh, settings: MassSpringSettings) -> Network:
 def report_damping(mass: float, stiffness: float) -> float:
     """Eq. 5.5, c = 2 sqrt(2 m (2 + 4 / k_a)), as a coefficient [N s/mm] of a ``mass`` [tonne] and a ``stiffness`` [N/mm].
 
-    It adds a number to one over a stiffness and is valid in one system of units only, which the report does not name. Read in SI
-    (kg, N/m, N s/m), as here, it is the critical damping 2 sqrt(m k) of a mass on a spring of k = 4 + 8 / k_a: of k_a itself
-    where that is 2 + sqrt(12) = 5.46 N/m, and of 4 N/m where k_a is large.
+    The equation adds a number to one over a stiffness, so it is valid in one system of units only, which the report does not name.
+    In SI (kg, N/m, N s/m), as here, it gives the critical damping 2 sqrt(m k) of a mass on a spring of k = 4 + 8 / k_a. This is k_a
+    if k_a is 2 + sqrt(12) = 5.46 N/m, and 4 N/m if k_a is large.
     """
     kilograms, newtons_per_metre = 1000 * mass, 1000 * stiffness
     return 2 * math.sqrt(2 * kilograms * (2 + 4 / newtons_per_metre)) / 1000
 
 
 def stable_time_step(network: Network, fixed: Ints) -> float:
-    """The time step [s] below which eqs 5.6 and 5.7 are stable, whatever the shape.
+    """The time step [s] below which eqs 5.6 and 5.7 are stable, for any shape.
 
-    A mode of the free masses is stable where ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions), with k its stiffness. At mass i
-    with n_i springs, stretched or not, k is at most ``2 n_i`` times that of a spring; the least limit of all masses counts. The
-    positive root is ``4 m / (c + sqrt(c^2 + 4 k m))``, a form without cancellation. For c = 0 it is 2 / omega with
-    omega^2 = 2 n k / m, the exact limit of two masses on one spring.
+    A mode of the free masses is stable if ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions), with k its stiffness. At mass i with
+    n_i springs, stretched or not, k is at most ``2 n_i`` times the stiffness of a spring; the least limit of all masses counts. The
+    positive root is ``4 m / (c + sqrt(c^2 + 4 k m))``, a form without cancellation. For c = 0 it is 2 / omega with omega^2 = 2 n k
+    / m, the exact limit of two masses on one spring.
     """
     springs = network.stiffness * np.bincount(network.springs.ravel(), minlength=len(network.masses))
     c = network.damping
@@ -108,8 +108,8 @@ def stable_time_step(network: Network, fixed: Ints) -> float:
 
 
 class MassSpringModel:
-    """A muscle as masses and springs that go from frame number to frame number: its ``network``, the ``fixed`` masses (k,) and the
-    bones that others collide with; masses are at ``points`` (n, 3) [mm], and were at ``previous`` a step before.
+    """A muscle as masses and springs that go from frame number to frame number: its ``network``, the ``fixed`` masses (k,), and the
+    bones with which the others collide. Masses are at ``points`` (n, 3) [mm]; a step before they were at ``previous``.
     """
 
     def __init__(self, problem: MuscleProblem, settings: MassSpringSettings) -> None:
@@ -152,7 +152,7 @@ class MassSpringModel:
         self.cost["time_steps"] += self.steps
 
     def carried(self, number: int) -> Floats:
-        """The positions (n, 3) [mm] of free masses at rest and of attached ones at frame ``number``."""
+        """The positions (n, 3) [mm] of free masses at rest and of attached masses at frame ``number``."""
         points = np.array(self.problem.mesh.points)
         for entry, masses in zip(self.problem.attached, self.attached, strict=True):
             points[masses] = apply(entry.bone.pose(number), points[masses])
@@ -165,7 +165,8 @@ class MassSpringModel:
     def frame(self, number: int) -> Frame:
         """Surface and fibres as the masses carry them; attached vertices move with their bones.
 
-        Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and ``inverted_tets``, their number.
+        Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and ``inverted_tets``, the number of inverted
+        tetrahedra.
         """
         given, mesh = self.problem, self.problem.mesh
         moved = self.points - mesh.points

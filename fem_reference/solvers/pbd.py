@@ -1,9 +1,9 @@
 """Position based dynamics of the muscle surface: the report's Algorithm 1 (section 5.5.3).
 
 Frame number n is the state after iteration n. In an iteration the bones first take their pose; then every sub-iteration is a full
-step of the algorithm. No external force acts, so the time step cancels and is no setting: ``dt v``, the displacements of vertices
-in one sub-iteration, are stored in place of velocities. As in the report, the result depends on the order of the vertices, since
-constraints are projected one after the other. Collisions are found anew in every sweep; line 13 finds them once.
+step of the algorithm. No external force acts, so the time step cancels and is no setting: instead of velocities, ``dt v``, the
+displacements of vertices in one sub-iteration, are stored. As in the report, the result depends on the order of the vertices, since
+constraints are projected one after the other. Collisions are found anew in every sweep, while line 13 finds them once.
 """
 
 from collections.abc import Sequence
@@ -29,8 +29,8 @@ _AS_NEAR = 1e-9
 
 
 class PbdCollision(Record):
-    """Contact of bones with free vertices. ``gap`` [mm]: the least distance of vertices, or that at rest where it is less;
-    ``stiffness``: the share of the displacement out of a bone that one projection makes.
+    """Contact of bones with free vertices. ``gap`` [mm]: the least distance of vertices, or their distance at rest if less;
+    ``stiffness``: the share of the displacement out of a bone that one projection applies.
     """
 
     gap: Annotated[Length, Field(ge=0)]
@@ -38,12 +38,12 @@ class PbdCollision(Record):
 
 
 class PbdSettings(Record):
-    """The settings of the algorithm; every key is required but those that turn an effect on.
+    """The settings of the algorithm; every key is required except the keys that turn an effect on.
 
     ``sub_iterations``: steps of the algorithm in each iteration, 3 in report 6.1. ``solver_iterations``: sweeps over all
     constraints in each step (line 15). ``damping``: share of every velocity that is lost in a step (line 8). ``stretch``,
-    ``volume``, ``bending``: stiffness of edge lengths, enclosed volume and dihedral angles: the share of its error that one
-    projection of a constraint removes, from 0 (constraint off) to 1.
+    ``volume``, ``bending``: stiffness of edge lengths, enclosed volume and dihedral angles: the share of an error that one
+    projection removes, from 0 (constraint off) to 1.
 
     ``anisotropy`` a: edges have the stiffness ``stretch (1 - a |cos|)``, with the angle to the nearest fibre at rest; 1 in the
     report's program with fibres. ``collision``: contact with bones (lines 12 to 14).
@@ -111,9 +111,8 @@ def hinges_of(triangles: Ints) -> Ints:
 
 
 def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
-    """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre at the point nearest to its middle.
-
-    Of two segments that are equally near up to rounding, as at a kink, the first counts, even if the scene is rotated.
+    """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre at the point nearest to its middle. If two
+    segments are equally near up to rounding, as at a kink, the first counts, even if the scene is rotated.
     """
     starts = np.setdiff1d(np.arange(len(fibres.points) - 1), fibres.offsets[1:] - 1)
     starts = starts[np.any(fibres.points[starts + 1] != fibres.points[starts], axis=1)]
@@ -131,7 +130,7 @@ def solve(setup: Setup, settings: PbdSettings, sink: Sink) -> Outcome:
 
 
 class PbdSurface(MovingSurface):
-    """A surface with its constraints, the last ``displacement`` (n, 3) [mm] of its vertices, and bones that it collides with."""
+    """A surface with its constraints, the last ``displacement`` (n, 3) [mm] of its vertices, and bones with which it collides."""
 
     def __init__(self, setup: Setup, settings: PbdSettings) -> None:
         super().__init__(setup)

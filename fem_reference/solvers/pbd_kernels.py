@@ -2,13 +2,13 @@
 
 A projection (``project_``) moves ``points`` (n, 3) [mm] in place by report eq. 5.14 weighted with the inverse masses w (n,),
 ``dp_i = -stiffness w_i grad_i C / (sum_j w_j |grad_j C|^2) C``, one constraint after the other in the order of the
-arrays (Gauss-Seidel), so that the result depends on that order. ``stiffness`` is the share of C that one projection
-takes away, to first order. Arrays should be writable and C-contiguous: the loops are compiled again for any other kind.
+arrays (Gauss-Seidel), so the result depends on this order. ``stiffness`` is the share of C that one projection removes, to first
+order. Arrays should be writable and C-contiguous: the loops are compiled again for any other kind.
 
 In extended position based dynamics (``pull_``; Macklin, Mueller and Chentanez 2016, DOI 10.1145/2994258.2994272) C stands for the
 energy ``C^2 / (2 alpha)`` with a compliance alpha. A projection moves points by ``dp_i = w_i grad_i C dl``, ``dl = -(C + a l) /
 (sum_j w_j |grad_j C|^2 + a)`` with w in 1/t and ``a = alpha / dt^2`` (their eq. 18), and adds dl to the multiplier l, which begins
-a time step as 0: ``l / dt^2`` is the constraint's force. The path to the solution depends on the order, the solution does not.
+a time step as 0: ``l / dt^2`` is the constraint's force. The path to the solution depends on the order; the solution does not.
 """
 
 import math
@@ -22,8 +22,8 @@ Vector = tuple[float, float, float]
 
 # Below this sine of a dihedral angle its gradient is rounding noise, and the pair counts as flat.
 FLAT = 1e-5
-# One projection turns a pair by no more than this [rad]. Points move along lines, not arcs: a turn by t lengthens a triangle
-# by the share t^2 / 2; at pairs that are folded shut (t near pi) this would grow from pair to pair without bound.
+# One projection turns a pair by at most this angle [rad]. Points move along lines, not arcs, so a turn by t lengthens a triangle by
+# the share t^2 / 2; at pairs that are folded shut (t near pi) this would grow from pair to pair without bound.
 LARGEST_TURN = 0.3
 _ZERO = (0.0, 0.0, 0.0)
 
@@ -101,9 +101,9 @@ def volume(points: Floats, triangles: Ints) -> tuple[float, Floats]:
 def dihedral(p1: Vector, p2: Vector, p3: Vector, p4: Vector) -> tuple[float, Vector, Vector, Vector, Vector]:
     """Angle [rad] of triangles (p1, p2, p3) and (p1, p2, p4) about their edge p1-p2, and its gradients. Eq. 5.22-5.30.
 
-    It is pi if they are flat and cannot distinguish the two sides of a fold. Gradients are zero if arccos has none: flat,
-    folded shut, no area. There arccos d loses half its digits too: it is taken as atan2(sine, d). Eq. 5.26 needs
-    eq. 5.30 transposed, and ``n2 . (n2 x p2)`` in it is an outer product.
+    The angle is pi for a flat pair, and is the same on the two sides of a fold. Gradients are zero if arccos has none: flat, folded
+    shut, no area. As arccos d loses half its digits there, it is computed as atan2(sine, d). Eq. 5.26 needs eq. 5.30 transposed,
+    and its ``n2 . (n2 x p2)`` is an outer product.
     """
     e, a, b = minus(p2, p1), minus(p3, p1), minus(p4, p1)
     u1, u2 = cross(e, a), cross(e, b)

@@ -1,34 +1,34 @@
 """The report's own program for position based dynamics, reimplemented so that it reproduces the recorded output.
 
-The program (github.com/cervenkam/muscle-deformation-PBD) departs from the report's text, section 5.5.3 and Algorithm 1:
+The program (github.com/cervenkam/muscle-deformation-PBD) differs from the report's text, section 5.5.3 and Algorithm 1:
 
 - edges: each is projected twice in a sweep, as a half-edge of either triangle, vertex by vertex (text: one constraint)
-- attached vertices weigh as much as all others and are put back after each step, so that their share of a correction is lost
+- attached vertices weigh as much as all others and are moved back after each step, so their share of a correction is lost
   (text: their w is 0, line 2)
-- volume: its change is divided by 6 and its gradient is not, which takes away a sixth of the error in a step (text:
+- volume: its change is divided by 6 but its gradient is not, which removes a sixth of the error in a step (text:
   eq. 5.18 to 5.21 drop the 6 in both)
-- folds: opened where they are sharper than at rest, never closed, and left where they are nearly flat or the correction
-  would be small or very great (text: eq. 5.22 keeps every angle)
+- folds: opened if they are sharper than at rest, never closed, and not changed if they are nearly flat or the correction would be
+  small or very great (text: eq. 5.22 keeps every angle)
 - one sweep over the constraints in each step; only then collisions are found (text: many sweeps, line 15; found first,
   line 13)
-- time: each of the steps of an iteration lasts as long as all of them should (text: section 6.1 divides it), but with no
-  force it cancels
+- time: each step of an iteration lasts as long as all steps together should (text: section 6.1 divides it), but without forces time
+  cancels
 - collisions: of vertices with voxels (text: section 6.1.1 has triangles), in the bone's frame at rest. Voxels that a
-  flood from one corner does not reach are inside. A vertex that was inside before moves by the bone's last motion, step after
-  step, even once the bone rests; one that enters is moved back by steps of a voxel; of two bones the later one wins. Voxels
-  lie along the axes at rest, and one voxel decides where a vertex goes: with the whole scene rotated, vertices of the case
-  hip_flexion differ by up to 57 mm (mean 4.5 mm; without voxels 1e-8 mm)
+  flood from one corner does not reach are inside. A vertex that was inside before moves by the bone's last motion, step after step,
+  even after the bone rests; a vertex that enters is moved back by steps of a voxel; of two bones the later takes precedence. Voxels
+  lie along the axes at rest, and one voxel decides where a vertex goes: if the scene is rotated, vertices of the case hip_flexion
+  differ by up to 57 mm (mean 4.5 mm; without voxels 1e-8 mm)
 
 Frame number n is the state after iteration n.
 
-The recorded box is reproduced in all 300 iterations, to the last digit of its single precision. That requires the program's own
-order of arithmetic, so this module shares no constraint with ``pbd``: the squeezed box is chaotic, and a difference of 1e-15 at
-rest, or between two orders, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with the flags that come with
-it, among them -Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by iteration
-50). For the same reason a bone's pose is here the product of its motions, and the angle of flat pairs at rest is off by 2e-8 rad.
+The recorded box is reproduced in all 300 iterations, to the last digit of its single precision. This requires the program's order
+of arithmetic, so this module shares no constraint with ``pbd``: the squeezed box is chaotic, and a difference of 1e-15 at rest, or
+between two orders, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with its own flags, among them -Ofast
+(gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by iteration 50). For the same reason
+a bone's pose is the product of its motions here, and the angle of flat pairs at rest has an error of 2e-8 rad.
 
-Two things differ from the program: the scene defines the attached vertices (there: all vertices in the voxels of a bone at rest),
-and a fibre's direction follows its own points (there: points of several fibres).
+Two things differ from the program: the scene defines the attached vertices (in the program, all vertices in the voxels of a bone at
+rest), and a fibre's direction follows its own points (in the program, points of several fibres).
 """
 
 from collections.abc import Sequence
@@ -57,7 +57,7 @@ DIGITS = 12
 
 
 class ProgramSettings(Record):
-    """The settings of the program; every key is required but those that turn an effect on.
+    """The settings of the program; every key is required except the keys that turn an effect on.
 
     ``sub_iterations``: steps in each iteration, 3 in report 6.1. ``damping``: share of every velocity that is lost in a step,
     0.01 in the program. ``bending``: factor of the correction of a dihedral angle, 0.9 in the program. ``voxels``: their number
@@ -75,7 +75,7 @@ class ProgramSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class Voxels:
-    """A box of k^3 voxels: a mask (k, k, k) of those ``inside`` a bone, its ``lower`` corner (3,), and their ``size`` (3,) [mm]."""
+    """A box of k^3 voxels: a mask (k, k, k) of voxels ``inside`` a bone, its ``lower`` corner (3,) and their ``size`` (3,) [mm]."""
 
     inside: NDArray[np.bool_]
     lower: Floats
@@ -83,7 +83,7 @@ class Voxels:
 
     @classmethod
     def of(cls, surface: Surface, count: int) -> "Voxels":
-        """The ``count``^3 voxels in the box around a bone; where that is flat they are 1 mm thick."""
+        """The ``count``^3 voxels in the box around a bone; if the box is flat they are 1 mm thick."""
         points, border = np.array(surface.points), np.zeros((count,) * 3, np.bool_)
         size = np.ptp(points, axis=0) / count
         empty = cls(border, points.min(axis=0), np.where(size > 0, size, 1.0))
@@ -102,7 +102,7 @@ class Voxels:
 class VoxelBone:
     """The ``voxels`` of a bone in its rest frame, its ``pose``, and its ``last`` motion that was not zero; both 4 x 4.
 
-    The pose is the product of all motions, as in the program; it differs from the ``given`` one by rounding.
+    The pose is the product of all motions, as in the program; it differs from the ``given`` pose by rounding.
     """
 
     def __init__(self, body: Bone, count: int, frame: int) -> None:
@@ -111,7 +111,7 @@ class VoxelBone:
         self.last = np.eye(4)
 
     def move(self, frame: int) -> None:
-        """Put the bone where it is at ``frame``."""
+        """Move the bone to its pose at ``frame``."""
         given = self.body.pose(frame)
         if not np.array_equal(given, self.given):
             self.last = np.round(given @ np.linalg.inv(self.given), DIGITS)
@@ -131,13 +131,13 @@ class VoxelBone:
 
 
 def half_edges_of(triangles: Ints) -> Ints:
-    """The sides of all triangles, (3 m, 2), in the order of the vertices they start at, then of the triangles."""
+    """The sides of all triangles, (3 m, 2), ordered by the vertices at which they start, then by triangles."""
     sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     return np.asarray(sides[np.argsort(sides[:, 0], kind="stable")])
 
 
 def hinges_of(points: Floats, triangles: Ints) -> tuple[Ints, Floats]:
-    """Each edge of a closed surface once, in the order of the later triangle at it, and the angle [rad] of the two triangles.
+    """Each edge of a closed surface once, in the order of the later of its triangles, and the angle [rad] of the two triangles.
 
     (e, 4): its ends, the vertices opposite it in the earlier and in the later triangle; (e,).
     """

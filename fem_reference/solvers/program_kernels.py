@@ -1,8 +1,8 @@
-"""The report's own program, compiled, with its order of summation: it only opens folds, and its bones are voxels.
+"""The report's own program, compiled, with its order of summation. It only opens folds, and its bones are voxels.
 
-All of it follows the program's source. As the result is chaotic, the last digit counts: each sum here has the order that gcc 12
-gives it with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than
-SSE2), as found in the machine code. Do not simplify them. Arrays should be writable and C-contiguous: any other kind is compiled
+All of it follows the program's source. As the result is chaotic, the last digit counts: each sum has the order that gcc 12 produces
+with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than SSE2), as
+found in the machine code. Do not simplify the sums. Arrays should be writable and C-contiguous: any other kind is compiled
 separately.
 """
 
@@ -90,7 +90,7 @@ def normals_of(points: Floats, triangles: Ints) -> Floats:
 
 @compiled
 def angles_of(normals: Floats, pairs: Ints) -> Floats:
-    """Angle [rad] of the triangles in each of ``pairs`` (e, 2) about their edge: pi where they are flat, or nearly."""
+    """Angle [rad] of the triangles in each of ``pairs`` (e, 2) about their edge: pi if they are flat, or nearly flat."""
     found = np.empty(len(pairs))
     for h in range(len(pairs)):
         cosine = dot(at(normals, pairs[h, 0]), at(normals, pairs[h, 1]))
@@ -165,7 +165,7 @@ def _unit_normal(a: Vector, b: Vector) -> Vector:
 
 @compiled
 def _is_inside(inside: Bools, place: Vector) -> bool:
-    """True if a ``place``, in voxels, lies in one that is inside."""
+    """True if a ``place``, in voxels, lies in a voxel inside."""
     x, y, z = place
     count = len(inside)
     return 0 <= x < count and 0 <= y < count and 0 <= z < count and inside[int(x), int(y), int(z)]
@@ -175,8 +175,8 @@ def _is_inside(inside: Bools, place: Vector) -> bool:
 def _marks(a: Vector, b: Vector, c: Vector, normal: Vector, corner: Vector) -> bool:
     """True if the triangle a, b, c, in voxels, marks the voxel whose lower corner is ``corner``.
 
-    It marks the voxel if its plane is near and the corner is beyond none of its edges by more than a diagonal. The planes at the
-    edges are made with its ``normal`` in mm, although voxels are not cubes.
+    The triangle marks the voxel if its plane is near and the corner is not beyond any of its edges by more than a diagonal. The
+    planes at the edges are made with its ``normal`` in mm, although voxels are not cubes.
     """
     away = _unit_normal(minus(b, a), minus(c, a))
     if abs(dot(away, minus(corner, a))) > DIAGONAL / 2:
@@ -205,10 +205,7 @@ def mark(border: Bools, points: Floats, places: Floats, triangles: Ints) -> None
 
 @compiled
 def flood(border: Bools) -> Bools:
-    """The voxels (k, k, k) that a flood from the corner (0, 0, 0) reaches, from face to face and not into the ``border``.
-
-    It never goes back to an index of 0.
-    """
+    """The voxels (k, k, k) reached by a flood from (0, 0, 0), through faces, not into the ``border`` or back to an index of 0."""
     outside = np.zeros(border.shape, np.bool_)
     found = np.zeros((border.size, 3), np.int64)
     outside[0, 0, 0] = not border[0, 0, 0]
@@ -229,7 +226,7 @@ def flood(border: Bools) -> Bools:
 
 @compiled
 def are_inside(inside: Bools, places: Floats) -> Bools:
-    """True (n,) of those ``places`` (n, 3), in voxels, that lie in one that is inside."""
+    """True (n,) for ``places`` (n, 3), in voxels, that lie in a voxel inside."""
     found = np.empty(len(places), np.bool_)
     for i in range(len(places)):
         found[i] = _is_inside(inside, at(places, i))
@@ -238,10 +235,9 @@ def are_inside(inside: Bools, places: Floats) -> Bools:
 
 @compiled
 def march_out(inside: Bools, goals: Floats, displacements: Floats) -> tuple[Floats, Bools]:
-    """The end places (n, 3) of points that are inside at ``goals`` (n, 3), and a mask (n,) of those that went too far; in voxels.
-
-    They go straight back along their ``displacements`` (n, 3), in steps of 1, until they are outside; too far means farther than
-    their length.
+    """The end places (n, 3) of points that are inside at ``goals`` (n, 3), and a mask (n,) of points that went too far; in voxels.
+    Points go straight back along their ``displacements`` (n, 3), in steps of 1, until they are outside; too far means farther than
+    the length of the displacement.
     """
     reached, too_far = goals.copy(), np.empty(len(goals), np.bool_)
     for i in range(len(goals)):

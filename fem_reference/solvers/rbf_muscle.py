@@ -1,15 +1,15 @@
-"""An implicit muscle of few Gaussians that move with the bones: the goal that the report sets in section 7.1.
+"""An implicit muscle of few Gaussians that move with the bones: the goal of section 7.1 of the report.
 
 The surface at rest is fitted by Gaussians, four numbers each (``geometry.gaussian_surface``). At each frame number
 
-- the centres, and a few points of each attachment that are at their bone, are as rigid as possible among their neighbours (eq. 5.10
-  on a graph of tens of nodes);
+- the centres, and a few points of each attachment that move with its bone, are as rigid as possible among their neighbours (eq.
+  5.10 on a graph of tens of nodes);
 - centres are pushed away from bones that the surface has entered, and vertices that are still inside are moved out;
-- each radius shrinks by the square root of the stretch along the muscle around its centre, as stretched fibres grow thin; all radii
-  are scaled together until the enclosed volume is that of rest.
+- each radius shrinks by the square root of the stretch along the muscle around its centre, as stretched fibres become thin; all
+  radii are scaled together until the enclosed volume is the rest volume.
 
-A vertex moves with the Gaussians that form the surface there, and is then moved to the level that it had at rest, so that the
-error of the fit does not change. Attached vertices are exact.
+A vertex moves with the Gaussians that form the surface around it, and is then moved to its level at rest, so the error of the fit
+does not change. Attached vertices are exact.
 """
 
 from dataclasses import dataclass
@@ -150,7 +150,7 @@ class RbfMuscle(MovingSurface):
         return np.asarray(turned + self.shares @ shifts)
 
     def _pushes(self, points: Floats, number: int) -> Floats:
-        """The displacement (n, 3) [mm] of each vertex out of the bone that it is in."""
+        """The displacement (n, 3) [mm] of each vertex out of the bone that contains it."""
         found, free = np.zeros_like(points), np.flatnonzero(self.setup.free)
         for bone in self.setup.bones:
             pose = bone.pose(number)
@@ -159,7 +159,7 @@ class RbfMuscle(MovingSurface):
         return found
 
     def _settled(self, moved: GaussianSurface, points: Floats, number: int) -> Floats:
-        """Vertices (n, 3) on their levels, attached ones at their bones, out of bones, with the volume of rest."""
+        """Vertices (n, 3) on their levels and outside bones, attached vertices at their bones, with the rest volume."""
         scale = 1.0
         for _ in range(_SCALINGS if self.settings.volume else 1):
             points = GaussianSurface(moved.centres, scale * moved.radii).project(points, self.level)

@@ -28,14 +28,14 @@ log = logging.getLogger(__name__)
 
 # Greatest distance [mm] (rms) of the first frame from the rest surface without a warning: above the rounding of any format.
 AT_REST = 0.1
-# Greatest distance at all, in diagonals of the rest surface's bounding box: above the change that solvers make in their first
-# frame, below that of a wrong unit (at a tenth of the size, points are at least 0.9 rms radii away, 0.26 diagonals for a ball).
+# Greatest allowed distance, in diagonals of the rest surface's bounding box: above the change by solvers in their first frame,
+# below the change by a wrong unit (at a tenth of the size, points are at least 0.9 rms radii away, 0.26 diagonals for a ball).
 NEAR_REST = 0.05
-# Least size of a frame over that at rest: no solver shrinks a body below it, but a frame in m is 1/1000 as large as one in mm.
+# Least size of a frame over the size at rest: no solver shrinks a body below it, but a frame in m has 1/1000 of the size in mm.
 SMALLEST = 1 / 50
-# Greatest distance [mm] between corners of an STL file that are one vertex: three times the spacing of float32 at 500 mm.
+# Greatest distance [mm] between corners of an STL file that count as one vertex: three times the spacing of float32 at 500 mm.
 SAME_POINT = 1e-4
-# Greatest distance of a time from that of its frame, in frames: above rounding to four digits, and far below half a frame.
+# Greatest distance of a time from the time of its frame, in frames: above rounding to four digits, and far below half a frame.
 ON_FRAME = 1e-3
 
 _INDICES = (".pvd", ".xdmf")
@@ -55,9 +55,9 @@ class RecordedSettings(Record):
 
 
 class About(Record):
-    """The contents of ``candidate.toml``: who computed the sequence, its unit of length, the time [s] that solving one frame took
-    on how many threads, and the parts of the scene ``left_out``, in words. For standings: the ``group`` of its method, the
-    ``case``, the key ``scene`` that its export states, and the ``sha256`` of each file by name, which is checked.
+    """The contents of ``candidate.toml``: who computed the sequence, its unit of length, the time [s] to solve one frame, the
+    number of threads, and the parts of the scene ``left_out``, in words. For standings: the ``group`` of its method, the ``case``,
+    the key ``scene`` that its export states, and the ``sha256`` of each file by name, which is checked.
     """
 
     name: FileName | None = None
@@ -73,7 +73,7 @@ class About(Record):
 
     @property
     def lacks(self) -> str:
-        """The end of a sentence with what was left out; empty if nothing was."""
+        """The end of a sentence with the parts left out; empty if there are none."""
         return f"; left out: {', '.join(self.left_out)}" if self.left_out else ""
 
     @field_validator("unit")
@@ -90,8 +90,8 @@ def about(path: Path) -> About:
 
 
 def choice(path: Path, unit: str | None = None, place: str = "folder") -> Candidate:
-    """The recorded frames in the folder or file at ``path`` as a candidate, with the name and, without a ``unit``, the unit that
-    their ``candidate.toml`` states; ``place`` names the path in messages.
+    """The recorded frames in the folder or file at ``path`` as a candidate, with the name and, without a ``unit``, the unit in
+    their ``candidate.toml``; ``place`` names the path in messages.
     """
     if not path.exists() or not path.parts:
         raise InputError(place, f'"{path}"', "a folder of frames")
@@ -114,7 +114,7 @@ def origin(settings: RecordedSettings) -> dict[str, Any]:
 
 
 def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
-    """Pass on every frame wanted, once all are read and checked to be of this surface; the cost is that of ``candidate.toml``."""
+    """Pass on every frame wanted, once all are read and checked to be of this surface; the cost is from ``candidate.toml``."""
     folder = Path(settings.folder)
     said = checked_about(folder, settings.unit)
     frames = list(checked_frames(setup, folder, settings.unit))
@@ -129,7 +129,7 @@ def checked_frames(setup: Setup, folder: Path, unit: float) -> Iterator[Frame]:
     """The frames wanted, one after the other, from the sequence in a ``folder``, in a ``unit`` [mm]; InputError at the first that
     is missing or not of this surface.
 
-    The times of an index are those of the frames by ``setup.interval`` [s], and frame numbers where that is None.
+    The times of an index are times of frames by ``setup.interval`` [s], or frame numbers if the interval is None.
     """
     source = _source(folder)
     sequence = _sequence(source, unit, setup.interval)
@@ -213,7 +213,7 @@ def _number(time: float, interval: float | None) -> int | None:
 def _positions(surface: Surface, rest: Surface) -> Floats:
     """The points (n, 3) [mm] of ``surface``, which must have the vertices and triangles of ``rest``.
 
-    The vertices must be in the order of ``rest``; the triangles may be in any order, and all of them turned over.
+    The vertices must be in the order of ``rest``; the triangles may be in any order, and all of them may be reversed.
     """
     check_finite(surface)
     want = f"the vertices and triangles of {rest.place}"
@@ -234,7 +234,7 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
 
 
 def _strangers(triangles: Ints, rest: Ints) -> NDArray[np.bool_]:
-    """True (m,) for ``triangles`` (m, 3) that occur more often than in ``rest`` (m, 3), with any of their corners first."""
+    """True (m,) for ``triangles`` (m, 3) that occur more often than in ``rest`` (m, 3), for any first corner."""
     both = np.concatenate([_turned(triangles), _turned(rest)])
     which = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     here, there = which[: len(triangles)], which[len(triangles) :]
@@ -249,7 +249,7 @@ def _turned(triangles: Ints) -> Ints:
 
 
 def _welded(soup: Surface, rest: Surface) -> Floats:
-    """Points (n, 3) [mm] of the vertices of ``rest`` from triangles that share none, in the order of its own."""
+    """Points (n, 3) [mm] of the vertices of ``rest`` from triangles without shared vertices, in the order of its triangles."""
     points, found = np.full(rest.points.shape, np.nan), []
     for vertices in (rest.triangles.ravel(), rest.triangles[:, ::-1].ravel()):
         points[vertices] = soup.points
@@ -263,7 +263,7 @@ def _welded(soup: Surface, rest: Surface) -> Floats:
 
 
 def _check_at_rest(place: str, number: int, positions: Floats, rest: Surface) -> None:
-    """Raise InputError if the first frame is far from ``rest``; warn where it is slightly off."""
+    """Raise InputError if the first frame is far from ``rest``; warn if it is slightly off."""
     away = float(np.sqrt(np.mean(np.sum((positions - rest.points) ** 2, axis=1))))
     limit = NEAR_REST * diagonal(rest.points)
     got = f"a first frame ({number}) that is {away:.3g} mm (rms) from the rest surface {rest.place}"

@@ -35,10 +35,10 @@ class PrescribedPath(NamedTuple):
 
 @compiled
 def forces(points: Floats, network: Network) -> Floats:
-    """The forces (n, 3) [N] on each mass, without damping: its weight and those of its springs.
+    """The forces (n, 3) [N] on each mass, without damping: its weight and the forces of its springs.
 
-    A spring from mass i pulls with ``k (l - L) (x_j - x_i) / l``: F_ij of eq. 5.3 is minus that, since eq. 5.4 has it on the
-    left; where both ends coincide it has no direction and does not pull.
+    A spring from mass i pulls with ``k (l - L) (x_j - x_i) / l``: F_ij of eq. 5.3 is minus this force, since eq. 5.4 has it on the
+    left. If both ends coincide the spring has no direction and does not pull.
     """
     found = np.empty_like(points)
     for i in range(len(points)):
@@ -63,7 +63,8 @@ def forces(points: Floats, network: Network) -> Floats:
 def advance(
     points: Floats, previous: Floats, network: Network, path: PrescribedPath, time_step: float, steps: int
 ) -> None:
-    """Move ``points`` (n, 3) [mm] in place through ``steps`` of ``time_step`` [s]; ``previous`` (n, 3) are those a step before.
+    """Move ``points`` (n, 3) [mm] in place through ``steps`` of ``time_step`` [s]; ``previous`` (n, 3) are the positions a step
+    before.
 
     Position Verlet with the velocity of the step before, eqs 5.6 and 5.7:
     ``x(t + dt) = 2 x(t) - x(t - dt) + dt^2 / m (F(t) - c (x(t) - x(t - dt)) / dt)``.

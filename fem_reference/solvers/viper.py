@@ -1,13 +1,13 @@
 """VIPER: a muscle as a bundle of rods with volume, bends and twist, by position based dynamics.
 
 Angles et al. (2019), doi:10.1145/3340260: a rod has points with a radius each and segments with a frame each; it resists stretch
-and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep their volume by the radii, which shrink where it is
-stretched. The rods of a bundle are tied by shape matching with a scale, which is that of the radii, and carry the surface.
+and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep their volume by the radii, which shrink where the
+rod is stretched. The rods of a bundle are tied by shape matching with a scale, which also scales the radii, and carry the surface.
 
 Each fibre of the case is a rod. The bones nearest to its ends act on bend and twist like neighbouring segments. There is neither
 mass nor time: a frame number begins with the previous state, moved by a blend of the bones. Stiffnesses are shares of an error, as
-in ``pbd``, so the answer depends on iterations. All rods have the same radius at rest, such that they fill the muscle's volume.
-Only rods keep their volume; the surface that they carry may not.
+in ``pbd``, so the result depends on iterations. All rods have the same radius at rest, chosen so that they fill the muscle's
+volume. Only rods keep their volume; the volume inside the surface that they carry may change.
 """
 
 from typing import Annotated
@@ -37,7 +37,7 @@ _AROUND, _CARRIERS = 6, 12
 class ViperSettings(Record):
     """``points``: their number in each rod. ``iterations``: sweeps over all constraints for each frame number. ``stretch``,
     ``bending``, ``volume``, ``bundle``: the stiffness of each kind of constraint in a sweep, from 0 (off) to 1. ``contact``: rods
-    keep a distance of their radius from bones, or that at rest, and the surface is moved out of bones; by default off.
+    keep a distance of their radius from bones, or their distance at rest, and the surface is moved out of bones; by default off.
     """
 
     points: Annotated[int, Field(ge=4, le=1000), Trade((4, 6, 12))]
@@ -52,8 +52,8 @@ class ViperSettings(Record):
 class Bundle:
     """Rods at ``rest`` (k, p, 3) [mm] of one ``radius``, where points of a section, one of each rod, are tied to those around them.
 
-    Each point and its neighbours move by a rotation and a scale, found by least squares from points, radii and frames; the
-    goal of a point is the mean of those of its groups.
+    Each point and its neighbours move by a rotation and a scale, found by least squares from points, radii and frames; the goal of
+    a point is the mean over its groups.
     """
 
     def __init__(self, rest: Floats, radius: float) -> None:
@@ -157,7 +157,7 @@ class Rods(MovingSurface):
         move_out(self.rods.reshape(-1, 3), self.bones, 1.0)
 
     def _frames(self) -> Floats:
-        """The rotation (k, p, 3, 3) at each point, in the middle between those of its segments."""
+        """The rotation (k, p, 3, 3) at each point, halfway between the rotations of its segments."""
         before, after = self.turns[:, :-1], self.turns[:, 1:]
         sign = np.where(np.sum(before * after, axis=2, keepdims=True) < 0, -1.0, 1.0)
         return kernels.matrices(kernels.unit(before + sign * after))
@@ -173,7 +173,7 @@ class Rods(MovingSurface):
         move_out(self.points, self.skin_bones, 1.0)
 
     def frame(self, number: int) -> Frame:
-        """Surface and fibres; scalars: the volume of the rods over that at rest, the least and the greatest of the segments."""
+        """Surface and fibres; scalars: volume ratios to rest, of all rods and the least and greatest of a segment."""
         ratio = kernels.volumes(self.rods, self.radii) / self.volumes
         scalars = {"rod_volume_min": float(ratio.min()), "rod_volume_max": float(ratio.max())}
         return Frame(number, self.points.copy(), self.fibres.copy(), scalars=scalars)
@@ -197,7 +197,7 @@ def shares(points: Floats, carriers: Floats, count: int) -> csr_array:
 
 
 def _along_rods(lines: list[Floats], count: int) -> csr_array:
-    """The shares (n, k * count) of points of rods in the points of ``lines``: of the two ends of the segment that each is on."""
+    """The shares (n, k * count) of points of rods in the points of ``lines``: the two ends of the segment that contains each."""
     shares_of = []
     for line in lines:
         travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])

@@ -1,7 +1,7 @@
 """Rods of position based dynamics: quaternions and the projections of constraints.
 
 k rods of p points each have ``points`` (k, p, 3) and ``radii`` (k, p) [mm], and ``turns`` (k, p + 1, 4): unit quaternions
-(w, x, y, z) that rotate each segment's frame from rest, first and last those of the two bones. Bones prescribe the end points.
+(w, x, y, z) that rotate each segment's frame from rest, the first and the last for the two bones. Bones prescribe the end points.
 
 All constraints of a kind are projected at once (Jacobi), each by a share that keeps the sum with its neighbours' steps from
 overshooting. Where constraints contradict each other the limit is the least sum of squares, for any order of points.
@@ -43,7 +43,7 @@ def unit(quaternions: Floats) -> Floats:
 
 
 def matrices(turns: Floats) -> Floats:
-    """The rotations (..., 3, 3) of ``turns`` (..., 4); not-a-number where they are."""
+    """The rotations (..., 3, 3) of ``turns`` (..., 4); NaN if they are NaN."""
     return turned(turns[..., None, :], np.eye(3)).swapaxes(-1, -2)
 
 
@@ -51,8 +51,8 @@ def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: floa
     """Project ``C = (x_b - x_a) / l - turned(u, t)`` of each segment, at ``rest`` (k, p - 1, 3) [mm] l times t.
 
     Neither stretch nor shear (Kugelstadt and Schoemer 2016): the segment is along its frame and as long as at rest. A frame has
-    the inverse mass 1 / l^2, so that nothing depends on the unit of length: the sum over masses and squared slopes is 1 + 1 + 4
-    times 1 / l^2, and 2 more bound what neighbours do.
+    the inverse mass 1 / l^2, so nothing depends on the unit of length: the sum over masses and squared slopes is 1 + 1 + 4 times 1
+    / l^2, and 2 more bound the effect of neighbours.
     """
     lengths = np.linalg.norm(rest, axis=2, keepdims=True)
     tangents, u = rest / lengths, turns[:, 1:-1]
@@ -63,10 +63,11 @@ def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: floa
 
 
 def project_bend(turns: Floats, stiffness: float) -> None:
-    """Project ``C = Im(conjugate(u_a) u_b)`` of neighbouring segments, and of the outer ones and bones: they bend and twist as
-    little as they can.
+    """Project ``C = Im(conjugate(u_a) u_b)`` of neighbouring segments, and of outer segments and bones: they bend and twist as
+    little as possible.
 
-    The Darboux vector of Kugelstadt and Schoemer (2016), with frames at rest taken as parallel: what is curved at rest remains so.
+    The Darboux vector of Kugelstadt and Schoemer (2016), with frames at rest taken as parallel: a rod that is curved at rest
+    remains curved.
     """
     a, b, found = turns[:, :-1], turns[:, 1:], np.zeros_like(turns)
     step = pure(-stiffness / 4 * product(conjugate(a), b)[..., 1:])
@@ -85,7 +86,7 @@ def volumes(points: Floats, radii: Floats) -> Floats:
 def project_volume(points: Floats, radii: Floats, rest: Floats, stiffness: float) -> None:
     """Project ``C = V / V_0 - 1`` of each segment, whose volumes at ``rest`` are (k, p - 1) [mm3], by radii and points.
 
-    Each moves by the mean of the steps of its two segments; a radius at an end has one segment.
+    Each point and radius moves by the mean of the steps of its two segments; a radius at an end has one segment.
     """
     steps, a, b = np.diff(points, axis=1), radii[:, :-1], radii[:, 1:]
     lengths, ratio = np.linalg.norm(steps, axis=2), volumes(points, radii) / rest

@@ -4,11 +4,11 @@ Macklin, Mueller and Chentanez 2016, "XPBD: position-based simulation of complia
 DOI 10.1145/2994258.2994272; report section 5.5.3 mentions it. The surface is a membrane with mass around an interior that
 resists change of volume. Position based dynamics, with the same constraints, gets stiffer with every sweep and every step.
 Here too few sweeps give too soft a muscle, enough sweeps give an implicit Euler step, and the equilibrium depends on the time step
-only as far as directions change within a step. All this holds where the sweeps resolve a step: with ``sqrt(k / m) dt`` of the
-stiffest edges below about 1, or with more sweeps. In the settings for Table 5.1 it is 3 (1.1 for half of the edges) with one sweep:
-twice the sub-steps change the positions of hip_flexion by up to 1.6 mm, 0.7 mm on average, in a displacement of 53 mm.
+only if directions change within a step. All this holds if the sweeps resolve a step: with ``sqrt(k / m) dt`` of the stiffest edges
+below about 1, or with more sweeps. In the settings for Table 5.1 this number is 3 (1.1 for half of the edges) with one sweep: twice
+the sub-steps change the positions of hip_flexion by up to 1.6 mm, 0.7 mm on average, in a displacement of 53 mm.
 
-Frame number n is the state after iteration n, ``frame_time`` after the one before; meanwhile bones move at constant velocity.
+Frame number n is the state after iteration n, ``frame_time`` after the previous frame; in between bones move at constant velocity.
 """
 
 import math
@@ -32,7 +32,7 @@ from fem_reference.solvers.pbd_kernels import dihedrals, distances, pull_dihedra
 
 
 class XpbdCollision(Record):
-    """Contact of bones with free vertices. ``gap`` [mm]: the least distance of vertices, or that at rest where it is less;
+    """Contact of bones with free vertices. ``gap`` [mm]: the least distance of vertices, or their distance at rest if less;
     ``stiffness`` [MPa/mm]: under a pressure p the surface comes nearer by p / stiffness.
     """
 
@@ -41,11 +41,11 @@ class XpbdCollision(Record):
 
 
 class XpbdSettings(Record):
-    """The settings of the method and of the muscle; every key is required but those that turn an effect on.
+    """The settings of the method and of the muscle; every key is required except the keys that turn an effect on.
 
-    ``frame_time`` [s]: the solver's own time from a frame number to the next; the scene's interval is that of the reference and
-    of recorded sequences. ``sub_steps``: time steps in it. ``sweeps``: over all constraints in each time step. ``density``
-    [t/mm3]: that of the enclosed body; its mass is divided among the vertices in proportion to area.
+    ``frame_time`` [s]: the solver's time from a frame number to the next; the scene's interval is for the reference and recorded
+    sequences. ``sub_steps``: time steps in a ``frame_time``. ``sweeps``: over all constraints in each time step. ``density``
+    [t/mm3]: of the enclosed body; its mass is divided among the vertices in proportion to area.
 
     ``stretch`` [N/mm]: Young's modulus times thickness of the membrane. ``bending`` [N mm]: the stiffness of a plate. ``volume``
     [MPa]: bulk modulus of the enclosed body. ``damping`` [1/s]: rate at which velocities decay without forces. ``collision``:
@@ -67,7 +67,7 @@ class XpbdSettings(Record):
 class XpbdConstraints:
     """Soft constraints that keep a body's rest state: any graph of edges, closed triangles and hinges, or none of a kind.
 
-    ``inverse_masses`` (n,) [1/t], 0 for what is attached; ``edges`` (e, 2) of ``lengths`` (e,) [mm] and compliances
+    ``inverse_masses`` (n,) [1/t], 0 for attached points; ``edges`` (e, 2) of ``lengths`` (e,) [mm] and compliances
     ``edge_softness`` (e,) [mm/N]; ``triangles`` (m, 3) around ``six_volumes`` [mm3], ``volume_softness`` [mm5/N]; ``hinges`` (h,
     4) of ``angles`` (h,) [rad] and ``hinge_softness`` (h,) [1/(N mm)].
     """
@@ -123,7 +123,7 @@ class XpbdStep:
 
 
 def inverse_masses(surface: Surface, attached: Ints, density: float) -> Floats:
-    """Inverse masses (n,) [1/t] of vertices that share the mass of the body as they share its surface; 0 if attached."""
+    """Inverse masses (n,) [1/t] of vertices, which share the mass of the body in proportion to area; 0 if attached."""
     areas = vertex_areas(surface.points, surface.triangles)
     mass = density * enclosed_volume(surface.points, surface.triangles) * areas / areas.sum()
     found = 1 / mass
@@ -139,7 +139,7 @@ class BoneContact:
         self.multipliers = np.zeros(len(softness))
 
     def project(self, points: Floats, inverse_masses: Floats, seconds: float) -> Floats:
-        """The displacements (n, 3) [mm] of one projection: contact never pulls, so that no multiplier is below 0."""
+        """The displacements (n, 3) [mm] of one projection: contact never pulls, so no multiplier is below 0."""
         vertices, value, away = self.bone.near(points)
         soft, before, mass = self.softness[vertices] / seconds**2, self.multipliers[vertices], inverse_masses[vertices]
         after = np.maximum(before - (value + soft * before) / (mass + soft), 0)
@@ -210,7 +210,7 @@ class XpbdSurface(MovingSurface):
 
 
 _EXAMPLE = {"frame_time": "20 ms", "sub_steps": 2, "sweeps": 2, "density": "1060 kg/m3", "stretch": "0.4 N/mm"}
-# The constraints of the solver pbd, with compliances in place of stiffnesses.
+# The constraints of the solver pbd, with compliances instead of stiffnesses.
 _TABLE = TableRow(
     "PBD",
     "xpbd",

@@ -83,9 +83,8 @@ def build(folder: Path, wanted: Sizes, store: Path, workers: Workers) -> dict[st
     kept = [name for name in names if name not in reasons]
     if not kept:
         raise InputError(folder, f"no scene that passes: {reasons}", "one at least")
-    for other in {path.name for path in (folder / "scenes").iterdir()} - {
-        *kept
-    }:  # left by a stopped build of other sizes
+    # A stopped build of other sizes may have left some.
+    for other in {path.name for path in (folder / "scenes").iterdir()} - {*kept}:
         shutil.rmtree(folder / "scenes" / other)
     files.write_text(folder / "load.py", Path(dataset_loader.__file__).read_text(encoding="utf-8"))
     found = {name: states.read_arrays(folder / "scenes" / name / "frames.npz") for name in kept}

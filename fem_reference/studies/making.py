@@ -130,9 +130,8 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
     except OvertimeError as why:
         outcome = Outcome("timed out", str(why))
     processor, cost = time.process_time() - began, outcome.cost
-    if (
-        "seconds_compile" in cost
-    ):  # compilation does not count; everything else takes at most as much processor time as clock time
+    # Compilation does not count; everything else takes at most as much processor time as clock time.
+    if "seconds_compile" in cost:
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
     load = clock.load()
     used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()} | ({} if load is None else {LOAD: load})

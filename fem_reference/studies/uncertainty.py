@@ -1,6 +1,5 @@
 """The bands of results that uncertain parameters of a case allow, by runs of its reference on a Latin hypercube."""
 
-import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,8 +20,6 @@ from fem_reference.studies import judging, refinement
 from fem_reference.studies.campaign import Workers, carry_out, shared_bench
 from fem_reference.studies.unknowns import Unknowns, unknowns
 from fem_reference.studies.variations import Trial
-
-log = logging.getLogger(__name__)
 
 # The quantities with a band, besides the surface and forces, where a case has them.
 QUANTITIES = ("volume.deviation", "fibre_length.mean", "moment_arm.mean", "joint_moment.moment")

@@ -210,10 +210,8 @@ def _by_element(base: Trial, choice: SolverChoice, text: str) -> Trial:
     effects[i] = make(name, bulk=found[0].bulk)
     if not _suits(choice, tuple(effects)):
         return plain
-    scene, changed = (
-        base.scene.model_copy(update={"effect": tuple(effects)}),
-        base.changed | {f"effect[{i}].name": name},
-    )
+    scene = base.scene.model_copy(update={"effect": tuple(effects)})
+    changed = base.changed | {f"effect[{i}].name": name}
     return base.varied("element", f"{text}, volume by {how}", choice=choice, scene=scene, changed=changed)
 
 

@@ -58,9 +58,7 @@ class Heart:
         return Body(mesh, self.effects(1, "z0"), fixed, (0.0, 1.0), Along(X))
 
     def passive(self, n: int) -> Body:
-        """A quarter of the ventricle of problem 2, whose material is isotropic, with n cells around an eighth of
-        a turn.
-        """
+        """A quarter of the ventricle of problem 2, whose material is isotropic, with n cells around an eighth of a turn."""
         mesh = shapes.ventricle_quarter((n, 7 * n // 2, n), ELEMENTS[self.element][0], self.degree)
         fixed = (*clamped("base"), *sliding("x0", "y0"))
         return Body(mesh, self.effects(2, "endo"), fixed, (0.0, 1.0), Along(X))

@@ -12,20 +12,8 @@ from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.paths import Affine
 from fem_reference.problems.touching import Touching
 from fem_reference.runs.store import Frame
-from fem_reference.verification.contact import (
-    APPROACH,
-    BULK,
-    CONTACT,
-    CORE,
-    FAR,
-    MU,
-    POISSON,
-    RADIUS,
-    YOUNG,
-    ball_readings,
-    hertzian,
-    in_series,
-)
+from fem_reference.verification import contact
+from fem_reference.verification.contact import APPROACH, BULK, CORE, FAR, MU, POISSON, RADIUS, YOUNG
 from fem_reference.verification.parts import NO_GRADIENT, clamped, control, find, neo_hooke
 
 SOFT, TRAVEL, BLOCK_STIFFNESS = 1.0, 0.2, 0.1  # bulk modulus [MPa], path of the top [mm], contact stiffness [MPa/mm]
@@ -92,7 +80,7 @@ def pressed(lab: Lab, n: int, radius: float) -> Frame:
     return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
 
 
-READINGS = ball_readings("low_near on high_near")
+READINGS = contact.ball_readings("low_near on high_near")
 
 
 def ball(lab: Lab, reading: str, radius: float) -> Finding:
@@ -113,21 +101,21 @@ def known_ball(name: str) -> float:
 
 ENTRIES = (
     *(
-        CONTACT(
+        contact.CONTACT(
             name=name,
             title=f"Two blocks with non-matching meshes pressed together{words}: the contact force",
             unit="N",
             measure=partial(blocks, itself=bool(words)),
             given={"stiffness": BLOCK_STIFFNESS},
             **control("contact 1 % stiffer", stiffness=1.01 * BLOCK_STIFFNESS),
-            truth=partial(in_series, SOFT, BLOCK_STIFFNESS, TRAVEL),
+            truth=partial(contact.in_series, SOFT, BLOCK_STIFFNESS, TRAVEL),
             within=2e-4,
             because="quadrature on one mesh is not exact for functions of the other: the force errs by 6e-5, the pressure by 2 %",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
         )
         for name, words in (("blocks_p2_p1", ""), ("blocks_as_one", ", as one surface that touches itself"))
     ),
-    *hertzian(
+    *contact.hertzian(
         "hertz_elastic_{}",
         "An elastic ball pressed against a large body of the same material: {}",
         ball,

@@ -40,5 +40,9 @@ def test_bodies_in_each_other_are_crossed_and_a_body_that_is_not_finite_is_not_k
     lower = np.array(positions)
     lower[1, upper.vertices] = rest.surface.points[upper.vertices] * [1, 1, 0.7]
     assert health.history(replace(run, positions=lower), "volume").values[:2] == pytest.approx([0, 30])
+    known = replace(run, positions=lower, integrated=np.array([[1.0, 1.0], [1.01, 0.98], [1.0, 1.0]]))
+    assert health.history(known, "volume").values == pytest.approx(
+        [0, 2, 0]
+    )  # flat facets do not enclose curved bodies
     # As one body, whose surface goes through itself.
     assert health.history(replace(run, spans=()), "crossed").values[:2] == pytest.approx([0, 100 * 1.0 / run.size])

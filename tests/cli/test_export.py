@@ -48,6 +48,7 @@ def solved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     return write
 
 
+@pytest.mark.slow
 def test_a_run_without_states_is_not_solved_again_unless_asked(solved, capsys, tmp_path: Path) -> None:
     words = solved(kept=())
     assert cli.main(words) == cli.BAD_INPUT

@@ -43,6 +43,7 @@ def test_the_verb_and_its_page(tmp_path, capsys) -> None:
     assert [entry["verdict"] for entry in facts["cells"]] == ["ok", "ok"]
 
 
+@pytest.mark.slow
 def test_a_program_of_somebody_else_is_judged_where_it_takes_what_acts(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=":")
     (tmp_path / "still").mkdir()

@@ -215,6 +215,7 @@ def test_the_terminal_and_the_page_beside_the_file_say_it(tmp_path: Path, capsys
     assert "- no springs at points of the surface" in (tmp_path / "exact" / "FEBIO.md").read_text()
 
 
+@pytest.mark.slow
 def test_python_exports_for_febio_as_well(tmp_path: Path) -> None:
     case = fr.load_case(small.write(tmp_path / "bar"), {"muscle.tet_size": "9 mm"})
     written = fr.export_case(case, tmp_path / "febio", "febio")

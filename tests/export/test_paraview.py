@@ -124,6 +124,7 @@ def test_frames_have_their_times_and_blocks_their_names(compared, exported) -> N
     assert compared[0].scene.frames.interval == pytest.approx(0.02)
 
 
+@pytest.mark.slow
 def test_warping_by_the_displacement_gives_the_run(compared, exported) -> None:
     result, tets = compared
     blocks = frame(exported, 2)

@@ -154,6 +154,17 @@ def test_scenes_and_effects_can_be_read() -> None:
     assert casefile.cases()
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("without_pictures")
+@pytest.mark.filterwarnings("ignore")  # those of Sphinx's own code; what pages have to be warned of is a mistake by -W
+def test_the_pages_are_read_without_a_warning(tmp_path: Path) -> None:
+    """Links and anchors lead somewhere, docstrings are valid, and each page is in a table of contents."""
+    build = pytest.importorskip("sphinx.cmd.build", reason="Sphinx is not installed (extra docs)")
+    assert build.main(["-q", "-W", "--keep-going", "-b", "dummy", str(pages.ROOT / "docs"), str(tmp_path)]) == 0
+    drawn = {name for page in pages.PAGES for name in re.findall(r"<!-- drawn: (\w+) -->", pages.page(page))}
+    assert drawn == set(drawn_results.DRAWN)
+
+
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of the pages, built once without a warning."""
@@ -166,6 +177,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.nightly  # by day the pages are read without being written
 @pytest.mark.slow
 def test_the_pages_load_nothing_from_elsewhere_and_have_their_pictures(built: Path) -> None:
     for path in built.glob("*.html"):
@@ -174,13 +186,12 @@ def test_the_pages_load_nothing_from_elsewhere_and_have_their_pictures(built: Pa
         for source in re.findall(r'<img[^>]* src="(?!data:)([^"]+)"', text):
             assert (built / source).is_file(), f"{path.name}: {source}"
     assert "compare" in (built / "api.html").read_text(encoding="utf-8")
-    drawn = {name for page in pages.PAGES for name in re.findall(r"<!-- drawn: (\w+) -->", pages.page(page))}
-    assert drawn == set(drawn_results.DRAWN)
     front = (built / "index.html").read_text(encoding="utf-8")
     assert front.count("<svg viewBox") == 3
     assert "--c-0072b2: #4aa3f0" in front  # pbd on dark paper, as on the pages of results
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.skipif(PROGRAM is None, reason="chromium is not installed: apt-get install chromium")
 def test_no_table_is_cut_without_a_sign_on_a_phone(built: Path, tmp_path: Path) -> None:

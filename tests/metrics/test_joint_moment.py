@@ -149,6 +149,7 @@ def does_the_work_of_its_moment(run: Run, joint: Joint) -> None:
     assert_allclose(-simpson(moment, angles), energy[-1] - energy[0], rtol=0.005)
 
 
+@pytest.mark.slow
 @pytest.mark.nightly
 def test_hip_flexion_as_shipped_does_the_work_of_its_moment(tmp_path: Path) -> None:
     case = workflow.load_case("hip_flexion", {"frames.last": 100})
@@ -204,6 +205,7 @@ def test_fibres_alone_have_the_arm_of_their_excursion_and_the_whole_muscle_has_n
     assert tension > 0.87 * np.linalg.norm(run.force("femur")[-1])
 
 
+@pytest.mark.slow
 def test_forces_on_all_bones_balance(bar: tuple[Run, MeasurementContext]) -> None:
     run, _ = bar
     forces = {name: run.force(name) for name in ("floor", "lid")}
@@ -339,6 +341,7 @@ def test_a_muscle_that_is_nearly_a_line_has_one_arm_by_force_and_by_excursion(
         assert_allclose(found.values[1:], known["moment_arm", "mean"], rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_muscle_that_is_nearly_a_line_does_the_work_of_its_moment(
     thread: tuple[Case, Run, MeasurementContext],
 ) -> None:

@@ -33,7 +33,8 @@ def test_a_number_is_never_taken_for_an_order() -> None:
     assert set(collagen_law(1).to) == {one.name for one in QUANTITIES if not one.is_order}
 
 
-@pytest.mark.parametrize("most", [6, pytest.param(100, marks=[pytest.mark.slow, pytest.mark.nightly])])
+@pytest.mark.slow
+@pytest.mark.parametrize("most", [6, pytest.param(100, marks=pytest.mark.nightly)])
 def test_collagen_meets_more_than_the_shipped_law_can(most) -> None:
     def misses(values) -> float:
         return sum(((values[one.name] - one.truth) / one.within) ** 2 for one in QUANTITIES)

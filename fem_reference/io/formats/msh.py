@@ -16,7 +16,7 @@ _PAST_END = 2
 
 
 class _Ending(io.BufferedReader):
-    """A file that limits reads beyond its end: meshio loops over the declared numbers, whatever the file contains."""
+    """A file that limits reads beyond its end: meshio loops over the declared numbers, for any content of the file."""
 
     past = 0
 

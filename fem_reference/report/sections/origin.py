@@ -40,9 +40,7 @@ def changes(case: Case) -> list[tuple[str, Any, Any]]:
 
 
 def _table(case: Case) -> dict[str, Any]:
-    """The case as nested tables, with entries of lists by number, and with all effects of its file even if some of them are left
-    out.
-    """
+    """The case as nested tables, with entries of lists by number, and with all effects of its file, even if some are left out."""
     effects = [one.effect for one in case.decisions] or case.effects
     listed: dict[str, Any] = {"effect": [effect.model_dump(mode="json") for effect in effects]}
     listed |= {"choice": "auto"} if case.decisions else {}

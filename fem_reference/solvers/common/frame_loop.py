@@ -38,7 +38,7 @@ class FrameModel(Protocol):
         """The trouble with the present state; None if there is none."""
 
     def frame(self, number: int, /) -> Frame:
-        """The present state, that of the frame ``number``."""
+        """The present state, at the frame ``number``."""
 
     def ending(self) -> Outcome:
         """The outcome of a run that reached every frame."""
@@ -46,7 +46,7 @@ class FrameModel(Protocol):
 
 def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> Outcome:
     """Take a ``model`` from rest at the first frame of ``setup`` through every frame number to the last, each in ``per_frame``
-    parts, at whose ends it takes the poses of bones. ``sink`` gets the frames. *Out of steps* where bones move too far in a part.
+    parts; bones take their poses at the end of each part. ``sink`` gets the frames. *Out of steps* if bones move too far in a part.
     """
     frames = setup.frames
     if frames[-1] - frames[0] > MOST_FRAMES:
@@ -59,7 +59,7 @@ def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> O
 
 
 def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
-    """Trouble with a bone that turns too far between two samples of its pose, or there and back; None without."""
+    """Trouble with a bone that turns too far between two samples of its pose, or out and back; None without trouble."""
     if all(bone.motion is None for bone in setup.bones):
         return None
     points, count = setup.surface.points, (setup.frames[-1] - setup.frames[0]) * per_frame
@@ -79,13 +79,13 @@ def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
 
 
 def refused(model: FrameModel, first: int, sink: Sink, why: Trouble) -> Outcome:
-    """The outcome of a loop that does not start, with the reason ``why``; ``sink`` gets the ``first`` frame, which is rest."""
+    """The outcome of a loop that does not start, with the reason ``why``; ``sink`` gets the ``first`` frame, at rest."""
     sink(model.frame(first))
     return Outcome(why.status, why.sentence, _begun(model))
 
 
 def each(model: FrameModel, numbers: Iterable[int], wanted: tuple[int, ...], sink: Sink) -> Outcome:
-    """Take ``model`` to the frame ``numbers`` one after the other; ``sink`` gets those that are ``wanted``."""
+    """Take ``model`` to the frame ``numbers`` one after the other; ``sink`` gets the ``wanted`` frames."""
     cost = _begun(model)
     for number in numbers:
         begin = time.perf_counter()
@@ -110,8 +110,8 @@ def _begun(model: FrameModel) -> dict[str, float]:
 def timed[M: FrameModel, S: Record](
     make: Callable[[Any, S], M], setup: Setup, settings: S, quick: S | None = None
 ) -> M:
-    """The model that ``make`` builds from ``setup`` and ``settings``, with its ``seconds_setup`` in the cost. Before that it solves
-    a frame of a tetrahedron, with ``quick`` settings if given, to compile every function, in ``seconds_compile``.
+    """The model that ``make`` builds from ``setup`` and ``settings``, with its ``seconds_setup`` in the cost. Before, a frame of a
+    tetrahedron is solved, with ``quick`` settings if given, to compile every function, in ``seconds_compile``.
     """
     begin = time.perf_counter()
     first = make(tetrahedron(), quick or settings)
@@ -166,7 +166,7 @@ def carry(points: Floats, setup: Setup, frame: float) -> None:
 
 
 def other_clock(setup: Setup, frame_time: float) -> str:
-    """A note where the interval [s] of the scene differs from a solver's ``frame_time`` [s]; empty otherwise."""
+    """A note if the interval [s] of the scene differs from a solver's ``frame_time`` [s]; empty otherwise."""
     if setup.interval is None or math.isclose(setup.interval, frame_time):
         return ""
     return f"; its interval between frame numbers is {frame_time:g} s, that of the scene {setup.interval:g} s"

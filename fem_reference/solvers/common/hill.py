@@ -2,8 +2,8 @@
 
 Forces are shares of the greatest isometric force F0, fibre lengths of the optimal length l0; velocities of shortening are positive,
 as in (5.1). The curves are those of Thelen (2003, doi 10.1115/1.1531112), with constants as in OpenSim's ``Thelen2003Muscle``;
-the structure is Zajac's (1989), and the hyperbola (5.1) is Hill's: its constants follow from a / F0 and the greatest velocity,
-``b = a / F0 vmax``. Unlike in Thelen's model, activation leaves the greatest velocity as it is.
+the structure is Zajac's (1989), and the hyperbola (5.1) is Hill's. Its constants follow from a / F0 and the greatest velocity, ``b
+= a / F0 vmax``. Unlike in Thelen's model, activation does not change the greatest velocity.
 """
 
 import math
@@ -19,16 +19,17 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Angle, Force, PositiveLength
 
-# Thelen 2003, young adults: width of the active curve; shape of the passive one and its strain at F0; the strain of the tendon at
-# F0; the greatest force of lengthening.
+# Thelen 2003, young adults: width of the active curve; shape of the passive curve and its strain at F0; the strain of the tendon at
+# F0; the greatest force in lengthening.
 _WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN, _LENGTHENING = 0.45, 5.0, 0.6, 0.04, 1.4
-# The tendon's toe ends at this share of F0, with this shape; from its end strain a line of the same slope follows (same source).
+# The tendon's toe ends at this share of F0, with this shape; beyond its end strain the curve is a line of the same slope (same
+# source).
 _TOE, _TOE_SHAPE = 0.33, 3.0
 _TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # times the strain
 _TOE_STRAIN = _TENDON_STRAIN * _TOE_SLOPE / (_TOE_SLOPE + 1 - _TOE)
 # Fibres are sought between these lengths in steps of at most this; velocities are found to this share of F0.
 _SHORTEST, _LONGEST, _STEP = 0.1, 3.0, 0.0075
-_SLACK = 1e-9  # a tendon with less strain than this, which may be round-off, is slack
+_SLACK = 1e-9  # a tendon with less strain than this, which may be rounding, is slack
 _LEAST = 1e-3  # the least activation for which a velocity follows from a force
 
 
@@ -66,8 +67,8 @@ class Hill(Record):
         return (activation * active(fibre) + passive(fibre)) * self.cosine(fibre) - self.tendon_force(path, fibre)
 
     def static(self, path: float, activation: float) -> tuple[float, float]:
-        """The force [N] and the fibre length [l0] in equilibrium at rest; of several equilibria that of the shortest fibre. A slack
-        tendon has no force. InputError if fibres would be shorter than a tenth of their optimal length.
+        """The force [N] and the fibre length [l0] in equilibrium at rest, the equilibrium with the shortest fibre if there are
+        several. A slack tendon has no force. InputError if fibres would be shorter than a tenth of their optimal length.
         """
         low = max(_SHORTEST, 1.0001 * self.thickness)
         if self.tendon_force(path, low) == 0:
@@ -118,9 +119,8 @@ class Hill(Record):
 
 
 class HillSettings(Record):
-    """Lines as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1). ``max_force``: that of all together.
-
-    ``fibre_share``: the optimal length of the fibres of a line over its length at the first frame, where its tendon is just
+    """Lines as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1). ``max_force``: the force of all together.
+    ``fibre_share``: the optimal length of the fibres of a line over its length at the first frame, at which its tendon is just
     slack; ``pennation``: the angle of the fibres; ``activation``: from 0 to 1.
     """
 
@@ -144,17 +144,17 @@ class HillSettings(Record):
 
 
 def active(fibre: float) -> float:
-    """The greatest contractile force [F0] at a ``fibre`` length [l0]: 1 at the optimal one."""
+    """The greatest contractile force [F0] at a ``fibre`` length [l0]: 1 at the optimal length."""
     return math.exp(-((fibre - 1) ** 2) / _WIDTH)
 
 
 def passive(fibre: float) -> float:
-    """The force [F0] of the parallel element at a ``fibre`` length [l0]: 0 up to the optimal one."""
+    """The force [F0] of the parallel element at a ``fibre`` length [l0]: 0 up to the optimal length."""
     return max(math.expm1(_PASSIVE * (fibre - 1) / _PASSIVE_STRAIN) / math.expm1(_PASSIVE), 0.0)
 
 
 def tendon(strain: float) -> float:
-    """The force [F0] of the tendon: 0 where it is slack, an exponential toe, then linear with the same slope."""
+    """The force [F0] of the tendon: 0 if it is slack, then an exponential toe, then linear with the same slope."""
     if strain <= 0:
         return 0.0
     if strain <= _TOE_STRAIN:
@@ -168,10 +168,10 @@ def _strain(force: float) -> float:
 
 
 def inverse_hyperbola(force: float, curvature: float) -> float:
-    """The velocity of shortening, as a share of the greatest, at a ``force``, a share of the isometric one: (5.1) solved for v.
+    """The velocity of shortening, as a share of the greatest, at a ``force``, a share of the isometric force: (5.1) solved for v.
 
-    In lengthening the force rises to 1.4 by a hyperbola that is twice as steep at 0 (Thelen 2003). Tangents continue both beyond
-    their ends.
+    In lengthening the force rises to 1.4 along a hyperbola that is twice as steep at 0 (Thelen 2003). Tangents continue both curves
+    beyond their ends.
     """
     slope, rise = 2 * (1 + 1 / curvature), _LENGTHENING - 1
     if force < 0:  # shortening faster than without load

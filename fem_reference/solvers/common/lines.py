@@ -17,7 +17,7 @@ from fem_reference.foundations.units import Angle, Point
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone, Joint
 
-# An angle out of a range by less than this [rad] is at its end, up to rounding.
+# An angle outside a range by less than this [rad] counts as at its end, up to rounding.
 _ROUNDING = 1e-9
 
 
@@ -31,9 +31,10 @@ class CurvePoint(Record):
 class Via(Record):
     """A point of every fibre that moves with a ``bone``; at rest it is ``at`` this share of the fibre's length.
 
-    ``within``: the least and the greatest angle of the ``joint`` at which lines pass through the point; else they leave it out.
-    ``curve``: its positions on the bone by the joint's angle, the same for all fibres; between them Catmull-Rom splines, whose
-    slopes are those of parabolas through neighbours; beyond them the nearest position. ``at`` then only orders the points.
+    ``within``: the least and the greatest angle of the ``joint`` at which lines pass through the point; at other angles they omit
+    it. ``curve``: its positions on the bone by the joint's angle, the same for all fibres. In between, the positions follow
+    Catmull-Rom splines, with the slopes of parabolas through neighbours; beyond the ends the nearest position is used. ``at`` then
+    only orders the points.
     """
 
     at: Annotated[float, Field(gt=0, lt=1)]
@@ -56,18 +57,18 @@ class Via(Record):
 
 @dataclass(frozen=True)
 class Guided:
-    """A via-point and the ``joint`` whose angle it depends on."""
+    """A via-point and the ``joint`` on whose angle it depends."""
 
     via: Via
     joint: Joint
 
     def passed(self, number: int) -> bool:
-        """True if lines pass the point at frame ``number``."""
+        """True if lines pass through the point at frame ``number``."""
         low, high = (-np.inf, np.inf) if self.via.within is None else self.via.within
         return bool(low - _ROUNDING <= self.joint.angle_of(number) <= high + _ROUNDING)
 
     def position(self, number: int) -> Floats:
-        """The point (3,) [mm] on its bone, in the frame of rest; that of a ``curve``."""
+        """The point (3,) [mm] of a ``curve`` on its bone, in the frame of rest."""
         angles = [point.angle for point in self.via.curve]
         places = np.array([point.position for point in self.via.curve])
         angle = np.clip(self.joint.angle_of(number), angles[0], angles[-1])
@@ -78,8 +79,8 @@ class Guided:
 
 @dataclass(frozen=True, eq=False)
 class Passed:
-    """The points (k, q + 1, 3) [mm] that k lines pass at a frame, each on the bone ``on`` (k, q + 1), with q parts between them,
-    counted line by line. Point j of the fibres is on part ``part[j]`` after the share ``share[j]`` of its length.
+    """The points (k, q + 1, 3) [mm] on k lines at a frame, each on the bone ``on`` (k, q + 1), with q parts between them, counted
+    line by line. Point j of the fibres is on part ``part[j]`` after the share ``share[j]`` of its length.
     """
 
     points: Floats
@@ -92,7 +93,7 @@ class Passed:
 class Lines:
     """A line for each of k fibres of ``sizes`` (k,) points, in p parts between fixed points at the shares ``places`` of its length.
 
-    ``fixed`` (k, p + 1, 3) [mm] at rest, each on ``bones[on]``, on (k, p + 1); ``guided``: those that depend on a joint.
+    ``fixed`` (k, p + 1, 3) [mm] at rest, each on ``bones[on]``, on (k, p + 1); ``guided``: points that depend on a joint.
     """
 
     bones: tuple[Bone, ...]
@@ -103,7 +104,7 @@ class Lines:
     guided: dict[int, Guided]
 
     def at(self, number: int) -> Passed:
-        """The points that the lines pass at frame ``number``."""
+        """The points through which the lines pass at frame ``number``."""
         resting, moved = np.array(self.fixed), np.array(self.fixed)
         for j, one in self.guided.items():
             if one.via.curve:
@@ -116,7 +117,7 @@ class Lines:
 
 
 def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: str) -> Lines:
-    """The lines of a muscle through ``vias`` or ``spread`` points; InputError below ``place`` where it lacks what they need."""
+    """The lines of a muscle through ``vias`` or ``spread`` points; InputError below ``place`` if the muscle lacks them."""
     fibres, evenly = problem.fibres, (np.arange(spread) + 0.5) / max(spread, 1)
     places = (0.0, *(via.at for via in vias), *evenly.tolist(), 1.0)
     named = [index(problem.bones, via.bone, join(place, f"via[{i}].bone")) for i, via in enumerate(vias)]
@@ -146,16 +147,16 @@ def along(points: Floats, places: list[float]) -> Floats:
 
 @lru_cache(maxsize=64)
 def _layout(sizes: tuple[int, ...], places: tuple[float, ...]) -> tuple[Ints, Floats]:
-    """The part on which each point of lines of these ``sizes`` lies, counted line by line, and the share of the part before it."""
+    """The part that contains each point of lines of these ``sizes``, counted line by line, and the share of the part before it."""
     part, share = zip(*(_spread(size, list(places)) for size in sizes), strict=True)
     return np.concatenate([found + i * (len(places) - 1) for i, found in enumerate(part)]), np.concatenate(share)
 
 
 def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
-    """The part and the share of it (count,) for each point of a line: fixed points, and the others evenly between them."""
+    """The part and the share in it (count,) of each point of a line: fixed points, and the others evenly between them."""
     at = np.rint(np.array(places) * (count - 1)).astype(np.int64)
     steps = np.arange(len(at))
-    at = np.maximum.accumulate(at - steps) + steps  # each at least one point after the one before
+    at = np.maximum.accumulate(at - steps) + steps  # each at least one point after the previous one
     at = np.minimum(at, count - 1 - steps[::-1])
     part = np.clip(np.searchsorted(at, np.arange(count), side="right") - 1, 0, len(at) - 2)
     return part, (np.arange(count) - at[part]) / np.diff(at)[part]
@@ -172,7 +173,7 @@ def nearest_bones(problem: MuscleProblem, points: Floats, place: str) -> Ints:
 
 
 def index(named: tuple[Bone, ...] | tuple[Joint, ...], name: str, place: str) -> int:
-    """The index of the item with this ``name``; InputError at ``place`` where there is none."""
+    """The index of the item with this ``name``; InputError at ``place`` if there is none."""
     names = [one.name for one in named]
     if name not in names:
         want = f"one of {', '.join(names)}" if names else "a joint of the case, which has none"

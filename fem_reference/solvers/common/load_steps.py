@@ -13,8 +13,8 @@ GROWTH = 1.5
 
 @dataclass(frozen=True)
 class Attempt:
-    """The record of a Newton solve at one load: its ``status``, which is that of the run if the solve fails finally; the number of
-    ``iterations``; the norms of the ``residuals`` [N, mm3] before the first iteration and after each one; for a failure a
+    """The record of a Newton solve at one load: its ``status``, which becomes the status of the run if the solve finally fails; the
+    number of ``iterations``; the norms of the ``residuals`` [N, mm3] before the first iteration and after each; for a failure a
     ``detail``: a sentence that begins with its subject.
     """
 
@@ -35,8 +35,8 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Step:
-    """The steps to a requested ``frame``: load steps, Newton iterations and cut-backs since the previous one; the ``last`` attempt;
-    the frame ``at`` which the last converged state is; the ``size`` of the next load step.
+    """The steps to a requested ``frame``: load steps, Newton iterations and cut-backs since the previous frame; the ``last``
+    attempt; the frame of the last converged state (``at``); the ``size`` of the next load step.
     """
 
     frame: float
@@ -70,10 +70,10 @@ def march(
     recall: Callable[[float], bool] = lambda _: False,
     last_resort: Callable[[], bool] = lambda: False,
 ) -> Iterator[Step]:
-    """Go from ``frames[0]`` (at rest, or where the run continues) through every frame. ``attempt`` solves at a load from the last
-    converged state, and must restore that state where it fails. A frame for which ``recall`` finds an earlier state needs no step.
-    Before giving up, the loop calls ``last_resort`` to change the solution method; if that returns True, it tries the load steps
-    again. The loop ends after the first frame that cannot be reached.
+    """Go from ``frames[0]`` (at rest, or the frame at which the run continues) through every frame. ``attempt`` solves at a load
+    from the last converged state, and must restore that state if it fails. A frame for which ``recall`` finds an earlier state
+    needs no step. Before giving up, the loop calls ``last_resort`` to change the solution method; if that returns True, it tries
+    the load steps again. The loop ends after the first frame that cannot be reached.
     """
     largest = math.inf if steps.largest is None else steps.largest
     at, step = float(frames[0]), min(steps.first, largest)
@@ -84,7 +84,7 @@ def march(
             if goal == frame and recall(frame):
                 at = goal
             while at < goal:
-                left = goal - at  # divided into equal steps of about ``step``, so that none is tiny
+                left = goal - at  # divided into equal steps of about ``step``, so that no step is tiny
                 size = left / max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))
                 then = goal if size == left else at + size
                 result = attempt(then)

@@ -72,8 +72,8 @@ def write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[obj
 
 
 def facts(problem: MuscleProblem) -> dict[str, Any]:
-    """The facts that mesh files lack: units, conventions, frames, bones, attachments, names of regions (their shares are in the
-    files of tets), effects with the unit of every parameter.
+    """The facts that mesh files lack: units, conventions, frames, bones, attachments, names of regions (shares are in the files of
+    tets), effects with the unit of every parameter.
     """
     contact = problem.contact
     bones = [

@@ -16,18 +16,18 @@ from typing import IO
 from fem_reference.foundations.subprocesses import peak_memory, processor_times
 from fem_reference.runs.contents import Status
 
-# The limit of clock time over the limit of processor time: beyond it the machine is too busy, or the program waits.
+# The limit of clock time over the limit of processor time: beyond this the machine is too busy, or the program waits.
 CLOCK = 10
-# The time between two looks at a program: a share of its time so far, but at least and at most these times [s].
+# The time between two checks of a program: a share of its time so far, between a least and a greatest time [s].
 _SHARE, _GLANCES = 0.05, (0.05, 1.0)
 _TAIL = 4096  # the number of bytes that are read from the end of a program's output
 
 
 @dataclass(frozen=True)
 class Ended:
-    """The end of a program: its exit status ``code`` (negative: the signal), clock time and processor time [s] with the processes
-    that it waited for, the peak memory [MB] of the largest of them at the last look, the last line that it printed, and the limit
-    that ended it.
+    """The end of a program: its exit status ``code`` (negative: the signal), clock time and processor time [s] including processes
+    for which it waited, the peak memory [MB] of the largest process at the last check, the last printed line, and the limit that
+    ended it.
     """
 
     code: int
@@ -57,7 +57,7 @@ def modules(folder: Path) -> set[Path]:
 def run(words: list[str], directory: Path, time_limit: float) -> Ended:
     """Run a program in a ``directory`` to its end, without a shell and without input; none of its processes outlives the call.
 
-    More than ``time_limit`` [s] of processor time ends it, and ``CLOCK`` times that by the clock. OSError if it does not start.
+    More than ``time_limit`` [s] of processor time, or ``CLOCK`` times as much elapsed time, ends it. OSError if it does not start.
     """
     with TemporaryFile() as printed:
         begin = time.perf_counter()
@@ -74,7 +74,7 @@ def run(words: list[str], directory: Path, time_limit: float) -> Ended:
 
 @contextmanager
 def _started(words: list[str], directory: Path, printed: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
-    """The process, in a session of its own, which ends here with all that belongs to it."""
+    """The process, in its own session, which ends here with all its processes."""
     process = subprocess.Popen(
         words, cwd=directory, stdin=subprocess.DEVNULL, stdout=printed, stderr=printed, start_new_session=True
     )
@@ -90,15 +90,15 @@ def _started(words: list[str], directory: Path, printed: IO[bytes]) -> Iterator[
 
 
 def _kill(process: int) -> None:
-    """Kill a running process and all its descendants, also those in sessions of their own."""
+    """Kill a running process and all its descendants, including those in other sessions."""
     for number in processor_times(process) or (process,):
         with suppress(ProcessLookupError):
             os.kill(number, signal.SIGKILL)
 
 
 class _Watch:
-    """A thread that kills a ``process`` that takes more than ``limit`` [s]; ``overran``: the reason if it did; ``memory`` [MB]: the
-    greatest peak of its processes (the peak in ``os.wait4`` begins with the memory of the process that starts them).
+    """A thread that kills a ``process`` that takes more than ``limit`` [s]; ``overran``: the reason, if it was killed; ``memory``
+    [MB]: the greatest peak of its processes (the peak in ``os.wait4`` begins with the memory of the process that starts them).
     """
 
     def __init__(self, process: int, limit: float) -> None:

@@ -1,4 +1,4 @@
-"""Solver protocol: the calls that solvers answer, and the records in which their files offer them."""
+"""Solver protocol: the functions of solvers, and the records in which their files offer them."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,15 +16,15 @@ from fem_reference.runs.writer import CutOff
 Moves = Literal["surface", "tetrahedra", "lines", "nothing"]
 
 
-# Solves a problem of one type: sinks every requested frame as it is reached. A physical failure is a status with a sentence, never
-# an exception; earlier frames remain. A scalar field is one frame, not-a-number where the status is a failure.
+# Solves a problem of one type and passes every requested frame to a sink as it is reached. A physical failure is a status with a
+# sentence, never an exception; earlier frames remain. A scalar field is one frame, NaN if the status is a failure.
 type Solve[P, S: Record] = Callable[[P, S, Sink], Outcome]
 # Continues a run that was cut off, from the last stored frame with a complete state, else from the first frame; ends as the
 # uninterrupted run would have ended.
 type GoOn[P, S: Record] = Callable[[P, S, Sink, CutOff], Outcome]
-# Raises InputError, with a key below a given place, where the settings do not suit the effects of a scene.
+# Raises InputError, with a key below a given place, if the settings do not suit the effects of a scene.
 type CheckEffects[S: Record] = Callable[[S, tuple[Effect, ...], str], None]
-# Raises InputError, with a key below a given place, where settings do not suit bones, attachments, fibres or boundary of a case.
+# Raises InputError, with a key below a given place, if settings do not suit bones, attachments, fibres or boundary of a case.
 type CheckProblem[S: Record] = Callable[[S, Any, str], None]
 
 
@@ -43,9 +43,9 @@ class Solver[P, S: Record]:
     """The record in which a solver's file offers ``solve`` for one task.
 
     ``settings``: the record of its settings. ``example``: some of them, as scene files write them, for contract tests.
-    ``require``: raises MissingSoftware where software for such settings is not installed. ``check_problem``: for settings that
-    refer to the contents of a case. ``slow``: it takes more than a few seconds on a small problem. ``go_on``: for solvers that
-    take long; all others begin again from rest. ``table``: its rows of the page table-5-1.
+    ``require``: raises MissingSoftware if software for such settings is not installed. ``check_problem``: for settings that refer
+    to the contents of a case. ``slow``: True if it takes more than a few seconds on a small problem. ``go_on``: for slow solvers,
+    continues a run; all others begin again from rest. ``table``: its rows of the page table-5-1.
     """
 
     task: ClassVar[Task]
@@ -61,7 +61,7 @@ class Solver[P, S: Record]:
     go_on: GoOn[P, S] | None = None
 
     def record(self, given: Mapping[str, Any], place: str) -> type[S]:  # noqa: ARG002
-        """The type of the settings ``given`` at a ``place``: always the same, unless the given ones add keys."""
+        """The type of the settings ``given`` at a ``place``: always the same, unless the given settings add keys."""
         return self.settings
 
     def fills(self, settings: S) -> bool:  # noqa: ARG002
@@ -78,9 +78,9 @@ class Solver[P, S: Record]:
 @dataclass(frozen=True, kw_only=True)
 class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
     """A solver of muscles. ``moves``: the carrier of its unknowns, whose mesh determines accuracy and cost; ``check_effects``: None
-    unless it simulates the effects of a scene; ``fibres``: True where a surface solver needs fibres under such settings; otherwise
-    it receives a ``Setup``, as the muscle is not filled with tetrahedra for it. ``depends_on``: the order of vertices or the size
-    of the muscle, if these alone change its answer.
+    unless it simulates the effects of a scene; ``fibres``: True if a surface solver needs fibres under such settings; otherwise it
+    receives a ``Setup``, without tetrahedra in the muscle. ``depends_on``: the order of vertices or the size of the muscle, if its
+    result depends on these.
     """
 
     task = "solve"

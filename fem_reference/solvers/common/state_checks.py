@@ -1,4 +1,4 @@
-"""Checks of the state of a body, made in order; the first that finds trouble ends the run."""
+"""Checks of the state of a body, made in order; the first check that finds trouble ends the run."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,9 +11,9 @@ from fem_reference.runs.contents import Status
 
 # A body has diverged if it is wider than this many times its width at rest and the present width of its attached part.
 _WIDE = 10.0
-# A body has diverged too if it encloses this many times its volume. Flesh keeps its volume within a few percent, and a surface that
-# keeps only its dihedral angles reached twice its volume; with a wrong root or scaling there is no bound. For a body that the bones
-# stretch to n times its length the limit is n times as great.
+# A body has also diverged if it encloses this many times its volume. Flesh keeps its volume within a few percent, and a surface
+# that preserves only its dihedral angles reached twice its volume; with a wrong root or scaling there is no bound. If the bones
+# stretch a body to n times its length, the limit is n times as great.
 _LARGE = 5.0
 
 
@@ -33,7 +33,7 @@ class StateCheck(Protocol):
 
 
 def first_trouble(checks: Iterable[StateCheck], state: Floats) -> Trouble | None:
-    """The first trouble that the ``checks`` find; later ones are not made."""
+    """The first trouble that the ``checks`` find; later checks are not made."""
     return next((found for check in checks if (found := check.trouble(state)) is not None), None)
 
 
@@ -45,8 +45,8 @@ class SurfaceCheck:
         self.width, self.volume = diagonal(rest.points), enclosed_volume(rest.points, rest.triangles)
 
     def trouble(self, state: Floats, /) -> Trouble | None:
-        """Diverged where a position is not a number, or the surface is much wider than at rest and than its attached vertices
-        are apart, or much larger than at rest; inverted where it is turned inside out.
+        """Diverged if a position is not a number, or the surface is much larger than at rest, or much wider than at rest and than
+        the distance of its attached vertices; inverted if it is turned inside out.
         """
         lost = np.flatnonzero(~np.isfinite(state).all(axis=1))
         if len(lost):

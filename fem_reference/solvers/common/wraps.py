@@ -1,4 +1,4 @@
-"""Obstacles on bones that lines go around: their settings, the paths around them, and points inside them."""
+"""Obstacles on bones around which lines wrap: their settings, the paths around them, and points inside them."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -20,7 +20,7 @@ from fem_reference.problems.setup import Bone
 from fem_reference.scenes.muscle import Axis, CaseSphere, Rod
 from fem_reference.solvers.common.lines import index
 
-# A fixed point in an obstacle by less than this [mm] is on its surface, up to rounding.
+# A fixed point less than this [mm] deep in an obstacle counts as on its surface, up to rounding.
 _TOUCHES = 1e-6
 
 
@@ -33,7 +33,7 @@ class Ellipsoid(Record):
 
 
 class Torus(Record):
-    """A ring with a hole that lines pass through: a tube of radius ``tube`` about a circle of ``radius`` across ``axis``."""
+    """A ring with a hole through which lines pass: a tube of radius ``tube`` about a circle of ``radius`` across ``axis``."""
 
     centre: Point
     axis: Axis
@@ -59,7 +59,7 @@ class ObstacleOn(Record):
 
     @property
     def name(self) -> str:
-        """The kind of shape, by which messages name it."""
+        """The kind of shape, as named in messages."""
         return next(key for key, given in self if key != "bone" and given is not None)
 
     def surface(self) -> Quadric | Ring:
@@ -111,7 +111,7 @@ class Wraps:
 
 
 def wraps_of(problem: MuscleProblem, given: tuple[ObstacleOn, ...], place: str) -> Wraps:
-    """The obstacles of a muscle; InputError below ``place`` where there is no such bone."""
+    """The obstacles of a muscle; InputError below ``place`` if there is no such bone."""
     bones = [index(problem.bones, one.bone, join(place, f"obstacle[{i}].bone")) for i, one in enumerate(given)]
     return Wraps(given, tuple(problem.bones[i] for i in bones))
 

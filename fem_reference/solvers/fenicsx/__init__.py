@@ -47,7 +47,7 @@ __all__ = ["BodySettings", "FieldSettings", "Settings", "session", "shared", "so
 
 
 def require(settings: BodySettings | FieldSettings) -> None:
-    """Raise MissingSoftware where FEniCSx is not installed or the requested ranks cannot be started."""
+    """Raise MissingSoftware if FEniCSx is not installed or the requested ranks cannot be started."""
     require_installed()
     if isinstance(settings, Settings):
         command_line(settings.ranks or 1)
@@ -77,7 +77,7 @@ def go_on(problem: AnyMuscle, settings: Settings, sink: Sink, cut_off: CutOff) -
     there = kept(cut_off, problem.body)
     again = settings.reuse and not _has_steps(problem)  # whether earlier states are used again
     if there.frames:
-        log.info("begun before; going on from what is kept up to frame %d", there.frames[-1])
+        log.info("begun before; continuing from the stored frames up to %d", there.frames[-1])
 
     def pass_on(frame: Frame) -> None:
         sink(frame)
@@ -113,7 +113,7 @@ class _Describe(Protocol):
 
 
 def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
-    """A function that describes a frame. For several muscles, the names of scalars begin with that of the muscle and a dot."""
+    """A function that describes a frame. For several muscles, the names of scalars begin with the name of the muscle and a dot."""
     if isinstance(problem, MuscleProblem):
         return partial(_described, problem, loads=_are_known(problem, settings))
     spans, names = problem.spans, tuple(problem.problems)
@@ -147,8 +147,8 @@ def _on_other(frame: Frame, name: str, other: str) -> dict[str, float]:
 
 
 def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
-    """True if external loads act, and the shape alone gives them as the solver integrates them: they are quadratic in it, so the
-    solver's quadrature has to be of degree 4 or above.
+    """True if external loads act, and the shape alone gives them as the solver integrates them. The loads are quadratic in the
+    shape, so the solver's quadrature must have degree 4 or above.
     """
     exact = settings.quadrature_degree is None or settings.quadrature_degree >= 4
     still = np.zeros((len(problem.mesh.tets), 10, 3))
@@ -170,7 +170,7 @@ def _loads(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
 
 def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: bool) -> Frame:
     """The frame with a note and more scalars: the magnitudes [N, N mm] of each force and of the sum over all constraints, the
-    ``loads`` where they are known, and the stresses.
+    ``loads`` if they are known, and the stresses.
     """
     scalars = frame.scalars
     smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])
@@ -209,8 +209,8 @@ def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> 
 
 def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
     """The distance between attached surface vertices and their targets on the bones, ``attachment_error_rms`` and
-    ``attachment_error_max`` [mm]. It is not zero: exact attachments are facets of tets, which cover the vertices only roughly, and
-    springs yield. Empty if nothing is attached.
+    ``attachment_error_max`` [mm]. The distance is not zero: exact attachments are facets of tets, which cover the vertices only
+    roughly, and springs yield. Empty if nothing is attached.
     """
     surface = frame.surface
     if not problem.attached or surface is None:
@@ -225,7 +225,7 @@ def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]
 
 def _samples(problem: AnyMuscle) -> dict[str, tuple[Ints, Floats]]:
     """The points at which displacements are sampled: by name, the tet of each point and its position at rest."""
-    if isinstance(problem, MusclesProblem):  # each sampled in its own muscle, however close another is
+    if isinstance(problem, MusclesProblem):  # each sampled in its own muscle, even if another is very close
         each = [_samples(one) for one in problem.problems.values()]
         starts = [span.cells.start for span in problem.spans]
         return {
@@ -241,7 +241,7 @@ def _samples(problem: AnyMuscle) -> dict[str, tuple[Ints, Floats]]:
 
 
 def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
-    """The settings with open ones filled in from the size of the problem and the machine."""
+    """The settings, with open values filled in from the size of the problem and the machine."""
     mesh, changes = problem.body.mesh, dict[str, int | bool]()
     check_element(
         settings.element, mesh.kind, mesh.degree, problem.body.effects, "element"
@@ -267,7 +267,7 @@ def _has_steps(problem: AnyMuscle) -> bool:
 
 
 def _check_touching(settings: Settings, place: str) -> None:
-    """Raise InputError below ``place`` where the settings do not suit muscles that touch each other."""
+    """Raise InputError below ``place`` if the settings do not suit muscles that touch each other."""
     if (settings.ranks or 1) > 1:
         want = "1, on which several muscles, or one that touches itself, are solved"
         raise InputError(join(place, "ranks"), settings.ranks, want)
@@ -278,7 +278,7 @@ def _check_touching(settings: Settings, place: str) -> None:
 
 
 def _check_ranks(settings: Settings, place: str) -> None:
-    """Raise InputError at ``place`` where multigrid is requested on more than one rank."""
+    """Raise InputError at ``place`` if multigrid is requested on more than one rank."""
     if settings.linear_solver == "multigrid" and (settings.ranks or 1) > 1:
         raise InputError(place, settings.ranks, "1, on which multigrid works")
 

@@ -37,7 +37,7 @@ def equations(problem: FieldProblem) -> tuple[Any, Any, Any, Ints]:
         strong = sum(effect.strong(psi, place) for effect in problem.effects)
         weak += _by_cell(msh, problem.tau) * problem.advection.along(test) * strong
     dx = ufl.Measure("dx", domain=msh, metadata={"quadrature_degree": QUADRATURE_DEGREE})
-    # The zero term gives the residual a right-hand side even where there are no sources.
+    # The zero term gives the residual a right-hand side even without sources.
     residual = weak * dx - fem.Constant(msh, 0.0) * test.value * dx
     ds = meshes.facet_measure(msh, meshes.local_facets(msh, [flux.facets for flux in problem.fluxes]), FACET_DEGREE)
     for i, flux in enumerate(problem.fluxes):
@@ -113,7 +113,7 @@ def _assembled(left: Any, right: Any, space: Any, fixed: Floats) -> tuple[Any, A
 
 
 def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
-    """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and the reason why there is none, if so."""
+    """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and the reason if there is none."""
     x = A.createVecRight()
     if not np.isfinite(A.norm() + b.norm()):
         return x.array, "the equations have a number that is not finite: does a formula lack a value somewhere?"

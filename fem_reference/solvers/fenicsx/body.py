@@ -44,8 +44,8 @@ class AssembledBody:
     def __init__(self, body: Body, settings: BodySettings) -> None:
         self.comm, self.reuse, self.effects = MPI.COMM_WORLD, settings.reuse and not body.remembers, body.effects
         changed = (isinstance(one, Energy) and (isinstance(one, Ramped) or not one.stored) for one in self.effects)
-        self.conserves = not any(changed)  # True where the energy changes only as the body deforms
-        self.judged = False  # True once its energy gap counts: only then is a halfway state worth its cost
+        self.conserves = not any(changed)  # True if the energy changes only as the body deforms
+        self.judged = False  # True once its energy gap counts: before, a halfway state is not worth its cost
         self.mesh = meshes.distribute(self.comm, body.mesh)
         count = self.mesh.topology.index_map(3).size_local
         self.cells = np.asarray(self.mesh.topology.original_cell_index, np.int64)[:count]
@@ -96,7 +96,7 @@ class AssembledBody:
         return ContactForces(law, body.bones, points, self.unknowns, body.frames[0], self.spent)
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """The trouble *diverged* where the energy has no value in the present state."""
+        """The trouble *diverged* if the energy has no value in the present state."""
         if np.isfinite(self.energy()):
             return None
         return Trouble("diverged", "to a state in which the energy is not a number: a law has no value there")
@@ -116,7 +116,7 @@ class AssembledBody:
         return int(self.unknowns.function_space.dofmap.index_map.size_global)
 
     def attempt(self, frame: float) -> Attempt:
-        """Solve at ``frame`` from the present state; restore that where Newton's method fails or a check refuses the result."""
+        """Solve at ``frame`` from the present state, which is restored if Newton's method fails or a check refuses the result."""
         before = np.array(self.unknowns.x.array)
         if self.clock.begins():
             self._begin(before)
@@ -133,8 +133,8 @@ class AssembledBody:
         return found
 
     def _settle(self, before: Floats, frame: float) -> None:
-        """Take the present state as that of ``frame``. ``before`` (n,) are the unknowns at the start of its step, from which a
-        halfway state is solved where work and energy disagree.
+        """Take the present state as the state of ``frame``. ``before`` (n,): the unknowns at the start of its step, from which a
+        halfway state is solved if work and energy disagree.
         """
         after, contact, middle = np.array(self.unknowns.x.array), self.system.contact, (self.at + frame) / 2
         looked, restoring = list[bool](), [one.restoring() for one in self.contacts]
@@ -165,7 +165,7 @@ class AssembledBody:
             one.go_back()
 
     def _begin(self, before: Floats) -> None:
-        """Find the initial acceleration of the body at rest, with unknowns ``before``, by a step in which nothing moves."""
+        """Find the initial acceleration of the body at rest, with unknowns ``before``, by a step without motion."""
         self.clock.instant(before)
         self.set_frame(self.clock.at)
         self.newton.solve(self.clock.at)  # the tangent is all mass; a failure would show in the first step
@@ -173,8 +173,8 @@ class AssembledBody:
         self.go_back(before)
 
     def recall(self, frame: float) -> bool:
-        """Restore an earlier state with the same loads and boundary conditions as at ``frame``, if there is one and it is on the
-        path (after a full turn the loads are those at rest, but the state is not). Its residual proves the equilibrium.
+        """Restore an earlier state with the same loads and boundary conditions as at ``frame``, if there is one on the path (after
+        a full turn the loads are the loads at rest, but the state is another). Its residual proves the equilibrium.
         """
         if self.clock.matters or not self.reuse:
             return False
@@ -195,7 +195,7 @@ class AssembledBody:
         return proved
 
     def arrive(self, frame: float) -> None:
-        """Take the present state, to which no load step led, as that of ``frame``."""
+        """Take the present state, to which no load step led, as the state of ``frame``."""
         self.at = frame
         for one in self.contacts:
             one.settle()
@@ -247,10 +247,10 @@ class AssembledBody:
         return contact | moving | gap | own
 
     def examine(self, frame: float) -> float | None:
-        """The number of directions in which the energy falls from the present state, which is that of ``frame``; None if the
-        tangent is not symmetric. The state is kept for later frames with the same loads.
+        """The number of directions in which the energy falls from the present state, at ``frame``; None if the tangent is not
+        symmetric. The state is kept for later frames with the same loads.
 
-        With drag or viscosity a direction counts if the departure along it would grow by more than a factor e over all frames, with
+        With drag or viscosity a direction counts if a departure along it would grow by more than a factor e over all frames, with
         the bones at rest from now on, and without the viscous stress of this step.
         """
         if self.recalled is not None:
@@ -290,7 +290,7 @@ class AssembledBody:
 
 def _linear_solver(system: System, body: Body, settings: BodySettings) -> LinearSolver:
     """The linear solver that ``settings`` name, or the default for the size of the ``system``."""
-    # Without friction and loads that have no energy, the tangent is symmetric.
+    # Without friction and without loads that have no energy, the tangent is symmetric.
     symmetric = not body.rubs and all(one.stored for one in body.effects if isinstance(one, Load))
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
     if kind == "multigrid":

@@ -21,7 +21,7 @@ class PrescribedRegion:
         self.nodes = fem.locate_dofs_topological(displacement.space, 2, facets)
         self.rest: Floats = displacement.space.tabulate_dof_coordinates()[self.nodes]
         self.all = displacement.dofs[self.nodes]  # the unknowns (m, 3) of the nodes
-        self.dofs: Ints = np.ravel(self.all[:, self.along])  # those prescribed, exactly or by springs
+        self.dofs: Ints = np.ravel(self.all[:, self.along])  # the prescribed unknowns, exactly or by springs
         self.exact = self.dofs if entry.stiffness is None else np.zeros(0, np.int64)
         self.wanted = fem.Function(displacement.space)
         self.extension = np.zeros_like(self.rest)
@@ -47,7 +47,9 @@ class PrescribedRegion:
         self.wanted.x.array.reshape(-1, 3)[self.nodes] = self.entry.path(ends, frame) - self.extension
 
     def extend(self, response: Floats) -> None:
-        """Extend springs at rest by the ``response`` (n,) of the unknowns: the other end of each is moved back by it."""
+        """Extend springs at rest by the ``response`` (n,) of the unknowns: the other end of each spring is moved back by this
+        response.
+        """
         if self.entry.stiffness is not None:
             self.extension = np.where(np.isin(np.arange(3), self.along), response[self.all], 0.0)
             self.wanted.x.array.reshape(-1, 3)[self.nodes] = -self.extension
@@ -90,7 +92,7 @@ class PointSprings:
         self.ends = self.wanted = self.points.rest - self.along * (self.points.positions(response) - self.points.rest)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
-        """Add the spring forces to ``residual`` over this rank's unknowns; advanced to first order by ``moves`` (n,) of these, if
+        """Add the spring forces to ``residual`` over this rank's unknowns; advanced to first order by their ``moves`` (n,), if
         given.
         """
         now = self.unknowns.x.array
@@ -111,8 +113,8 @@ class PointSprings:
 
 
 class Tendons(PointSprings):
-    """Straight lines from ``points`` of this rank's cells to the anchor of a ``Prescribed``, which its path moves: each pulls with
-    its stiffness times its extension ``l - l0``, and not at all when slack.
+    """Straight lines from ``points`` of this rank's cells to the anchor of a ``Prescribed``, which its path moves. Each line pulls
+    with its stiffness times its extension ``l - l0``, and not at all when slack.
     """
 
     def __init__(self, unknowns: fem.Function, entry: Prescribed, points: ContactPoints) -> None:
@@ -124,7 +126,7 @@ class Tendons(PointSprings):
         """Do nothing: no tendon is taut at rest."""
 
     def tangent(self) -> tuple[Ints, Floats, Floats]:
-        """``k n n^T + k (l - l0) / l (1 - n n^T)`` along the direction n of a taut line, 0 of a slack one."""
+        """``k n n^T + k (l - l0) / l (1 - n n^T)`` along the direction n of a taut line, 0 for a slack line."""
         along, length, tension = self._lines(self.unknowns.x.array)
         straight = along[:, :, None] * along[:, None, :]
         taut = np.where(length >= self.lengths, self.stiffness[:, 0], 0.0)[:, None, None]

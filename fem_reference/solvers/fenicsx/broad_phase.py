@@ -1,5 +1,5 @@
 """A search for material points that may be near a bone. The points of a cell form a patch, which stays out of reach until its nodes
-have moved as far as its clearance was at the last search.
+have moved by its clearance at the last search.
 """
 
 from collections.abc import Callable
@@ -12,8 +12,9 @@ from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 
 
 class Patches:
-    """The points of each of p cells. A point moves at most ``spread`` (p,) times as far as the k nodes of its cell: the sum of the
-    magnitudes of their basis functions there. Where these do not give the rest position, a rotation adds at most ``off`` (p,) [mm].
+    """The points of each of p cells. A point moves at most ``spread`` (p,) times as far as the k nodes of its cell; this is the sum
+    of the magnitudes of their basis functions at the point. If these do not give the rest position, a rotation adds at most ``off``
+    (p,) [mm].
     """
 
     def __init__(self, points: ContactPoints) -> None:
@@ -36,9 +37,9 @@ class Patches:
 
 
 class Nearby:
-    """Finds the points within ``reach`` [mm] of a bone of a ``shape``, and perhaps some more. It keeps for each patch the clearance
-    ``free`` (p,) [mm] of its points at the last search, the positions ``seen`` (p, k, 3) of its nodes then, in the bone's frame,
-    and whether a search has examined its points (``met``) since the last converged state.
+    """Finds the points within ``reach`` [mm] of a bone of a ``shape``, and perhaps some more. For each patch it keeps the clearance
+    ``free`` (p,) [mm] of its points and the positions ``seen`` (p, k, 3) of its nodes at the last search, in the bone's frame, and
+    whether a search has examined its points since the last converged state (``met``).
     """
 
     def __init__(self, shape: Obstacle, reach: float, patches: Patches) -> None:
@@ -48,7 +49,7 @@ class Nearby:
         self.met = np.ones(patches.count, bool)
 
     def find(self, nodes: Floats, local: Callable[[Ints], Floats]) -> tuple[Ints, Sampled]:
-        """The points (n,) that may be within reach, and the bone's distance there. ``nodes`` (m, 3) [mm] are in the bone's frame;
+        """The points (n,) that may be within reach, and their distance to the bone. ``nodes`` (m, 3) [mm] are in the bone's frame;
         ``local`` gives the positions of points in that frame.
         """
         now = nodes[self.patches.nodes]
@@ -68,8 +69,8 @@ class Nearby:
         self, before: Callable[[Ints], Floats], after: Callable[[Ints], Floats]
     ) -> tuple[Ints, Floats, Floats]:
         """The points (n,) whose straight path since the last converged state may have come within reach, and the ends (n, 3) of
-        the path, which ``before`` and ``after`` give for any points. A patch that was not examined since lies in a ball clear of
-        the bone, and so do the paths of its points.
+        the path, which ``before`` and ``after`` give for any points. A patch that was not examined since then, and the paths of its
+        points, lie in a ball clear of the bone.
         """
         points, _ = self.patches.points(np.flatnonzero(self.met))
         starts, ends = before(points), after(points)

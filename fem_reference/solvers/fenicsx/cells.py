@@ -35,7 +35,7 @@ class Structure(NamedTuple):
 @dataclass
 class Tangent:
     """The ``entries`` (e + 1,) of a matrix, the ``places`` (m, u, u) of each cell's entries among them, and the ``unit`` of unknown
-    pressures. The last entry collects all that belong to prescribed unknowns.
+    pressures. The last entry collects everything that belongs to prescribed unknowns.
     """
 
     entries: Floats
@@ -44,8 +44,8 @@ class Tangent:
 
 
 class CellSums:
-    """Sums over this rank's own cells. ``unknowns`` (m, u): those of each cell, the displacement component by component, then the
-    pressures; ``structure``: the sparsity of the tangent.
+    """Sums over this rank's own cells. ``unknowns`` (m, u): by cell, the displacement component by component, then the pressures;
+    ``structure``: the sparsity of the tangent.
     """
 
     def __init__(self, form: Form) -> None:
@@ -90,8 +90,8 @@ class CellSums:
         self, residual: Floats, into: Tangent | None = None, moves: Floats | None = None, *, pointwise: bool = False
     ) -> None:
         """Add the forces of the cells to ``residual`` (n,) over this rank's unknowns, ghosts included. If a tangent is given, add
-        that of the cells ``into`` it, and to the residual its first-order change by ``moves`` (n,) of the displacement, if any.
-        ``pointwise``: the pressure follows the volume at every point and is no unknown of its own.
+        the tangent of the cells ``into`` it, and to the residual its first-order change by ``moves`` (n,) of the displacement, if
+        any. ``pointwise``: the pressure follows the volume at every point and is not an unknown.
         """
         given = self.form.derivatives.first if into is None else self.form.derivatives.second
         for some in self._chunks():
@@ -138,7 +138,7 @@ class CellSums:
         return found
 
     def stabilising_energy(self) -> float:
-        """The energy [N mm] that stabilises the pressure of this rank's cells; 0 for elements that need none."""
+        """The energy [N mm] that stabilises the pressure of this rank's cells; 0 for elements without stabilisation."""
         if self.projection is None:
             return 0.0
         values = self.function.x.array[self.unknowns[:, 3 * self.nodes :]]
@@ -184,8 +184,8 @@ class CellSums:
 
 
 def _without_pressure(values: Floats, others: int) -> Floats:
-    """First derivatives with respect to the ``others`` and the pressure, and the upper triangle of the second ones, (..., v). The
-    stiffness by the pressure, K cof F x cof F, replaces the terms that couple the pressure with the others.
+    """First derivatives with respect to the ``others`` and the pressure, and the upper triangle of the second derivatives, (...,
+    v). The stiffness by the pressure, K cof F x cof F, replaces the terms that couple the pressure with the others.
     """
     values, (rows, columns) = values.copy(), np.triu_indices(others + 1)
     second, last = values[..., others + 1 :], columns == others

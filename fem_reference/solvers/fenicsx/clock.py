@@ -18,7 +18,7 @@ class Clock:
     """Sets the time ``step`` of a form; does nothing for a form without one.
 
     With inertia a body is at rest up to its first requested frame: it is ``resting`` until its initial acceleration is known, and
-    moves from then on.
+    then moves.
     """
 
     def __init__(self, body: Body, step: TimeStep | None) -> None:
@@ -41,7 +41,7 @@ class Clock:
             self._set(unknowns, self._seconds(frame - self.at))
 
     def settle(self, frame: float, unknowns: Floats) -> None:
-        """Record the load step to ``frame``, which ends with ``unknowns``, as the last good one."""
+        """Record the load step to ``frame``, which ends with ``unknowns``, as the last good step."""
         self.at = frame
         if self.step is not None and self.step.velocity is not None and frame > self.first:
             moved = (self.step.before.x.array, self.velocity, self.acceleration, unknowns)
@@ -49,11 +49,11 @@ class Clock:
             self.step.velocity.x.array[:] = self.velocity
 
     def begins(self) -> bool:
-        """True if a body with inertia first moves in the next load step, before which its acceleration has to be found."""
+        """True if a body with inertia first moves in the next load step; its acceleration must be found before."""
         return self.resting and self.at >= self.first
 
     def instant(self, unknowns: Floats) -> None:
-        """Start a load step from rest at ``unknowns`` that is so short that nothing moves."""
+        """Start a load step from rest at ``unknowns``, too short for any motion."""
         self._set(unknowns, self._seconds(_INSTANT * self.whole))
 
     def begin(self, unknowns: Floats) -> None:
@@ -108,5 +108,5 @@ class Clock:
             self.step.predicted.x.array[:] = self.momentum.predicted(*moving, seconds)
 
     def _seconds(self, frames: float) -> float:
-        assert self.interval is not None  # checked where an effect needs it
+        assert self.interval is not None  # checked if an effect needs it
         return frames * self.interval

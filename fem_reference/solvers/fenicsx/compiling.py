@@ -24,7 +24,7 @@ from ufl.domain import extract_domains
 from fem_reference.foundations import native
 
 # All instructions of this machine, and sums in any order. Never -ffast-math itself: it assumes that no number is NaN, which here
-# marks a state without a value, and it makes the whole process round denormal numbers to zero.
+# marks a state without a value, and it makes the process round denormal numbers to zero.
 FLAGS = ["-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros"]
 FLAGS += ["-fassociative-math", "-freciprocal-math"]
 # FFCx stores compiled forms under a hash of their content and these options, which include the kind of machine.
@@ -32,8 +32,8 @@ OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's compilation, run by one process at a time. A lock for each form would cost more: its signature takes longer than the
-    search for a compiled form.
+    """FFCx's compilation, run by one process at a time. A lock for each form would take longer: its signature needs more time than
+    the search for a compiled form.
     """
 
     @wraps(compiled)
@@ -47,8 +47,8 @@ def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
 
 
 def _complete[R](search: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's search for a compiled form, after incomplete files of it are removed. As this process holds the lock, no other is
-    writing them: an interrupted or killed process left them, and FFCx would wait for their completion.
+    """FFCx's search for a compiled form, after incomplete files of it are removed. As this process holds the lock, no other process
+    is writing these files: an interrupted or killed process left them, and FFCx would wait for their completion.
     """
 
     @wraps(search)
@@ -75,7 +75,7 @@ def form(expression: Any) -> Any:
 
 
 class _Code(NamedTuple):
-    """A compiled expression, its ``module``, and the places in its formula's functions and constants of those that it reads."""
+    """A compiled expression, its ``module``, and the places of the functions and constants that it reads in its formula's lists."""
 
     expression: Any
     module: Any
@@ -103,7 +103,7 @@ def expression(value: Any, points: Any) -> Any:
 
 
 def expressions(values: list[Any], points: Any, first: int) -> tuple[Any, Any]:
-    """Compiled expressions at reference ``points`` (q, 3): one of the ``first`` few of the scalars ``values``, and one of all."""
+    """Compiled expressions at reference ``points`` (q, 3): one for the ``first`` few of the scalars ``values``, and one for all."""
     whole, part = _bound(ufl.as_vector(values), points, (first,))
     return part, whole
 

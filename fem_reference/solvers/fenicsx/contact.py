@@ -23,9 +23,9 @@ from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.friction import Friction, Grip
 from fem_reference.solvers.fenicsx.spent import Spent
 
-# A point deeper in a bone than this share of the bone's half thickness counts as gone through.
+# A point deeper in a bone than this share of half the bone's thickness counts as having passed through.
 _GIVEN_WAY = 0.75
-# A point that slides round a rim has a straight path that cuts the rim at most this deep, as a share of the half thickness; the
+# The straight path of a point that slides round a rim cuts the rim at most this deep, as a share of the half thickness; the
 # smoothing is a bound too.
 _RIM = 0.25
 
@@ -78,7 +78,7 @@ class ContactForces:
         self.settle()
 
     def look(self) -> None:
-        """Search for points within reach of each bone: also those that overlap it, or that it supports, at rest."""
+        """Search for points within reach of each bone, including points that overlap it, or that it supports, at rest."""
         patches, support = Patches(self.points), self.law.in_situ or 0.0
         reach = [self.law.smoothing + max(support, float(-one.min(initial=0.0))) for one in self.overlaps]
         self.nearby = [Nearby(bone.shape, far, patches) for bone, far in zip(self.bones, reach, strict=True)]
@@ -158,17 +158,15 @@ class ContactForces:
             self.points.add_forces(residual, -self.points.areas[which, None] * found, which)
 
     def tangent(self) -> Iterator[tuple[Ints, Floats, Floats]]:
-        """The derivative of the residual, bone by bone: cells (p,) of the points in contact, the basis (p, k) there, and the
-        derivative ``slope`` (p, 3, 3) of the tractions.
-        """
+        """The derivative of the residual by bone: cells (p,) of pressed points, their basis (p, k), traction slopes (p, 3, 3)."""
         for one in self.now:
             if len(touched := one.pressed):
                 areas = self.points.areas[touched, None, None]
                 yield self.points.cells[touched], self.points.basis[touched], -areas * one.slope
 
     def forces(self) -> dict[str, tuple[Floats, Floats]]:
-        """The force (3,) [N] of each bone, by name, on this rank's points, and its moment (3,) [N mm] about the origin; and, under
-        the names of both, those on the points of each part that the law names.
+        """The force (3,) [N] of each bone, by name, on this rank's points, and its moment (3,) [N mm] about the origin; also, under
+        the names of bone and part, on the points of each part that the law names.
         """
         found = {}
         for entry, one in zip(self.bones, self.now, strict=True):
@@ -181,8 +179,8 @@ class ContactForces:
 
     def scalars(self) -> dict[str, float]:
         """The greatest ``contact_depth`` [mm], ``contact_pressure`` [MPa] and ``PART.contact_pressure`` of parts; the rest area in
-        contact, ``contact_area`` [mm2], and its ``contact_points``; the number ``contact_points_near`` of those whose distance was
-        computed; ``overlap_at_rest`` [mm] of the deepest point, removed or not; and ``friction_work`` [N mm], the total dissipated.
+        contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, those whose distance was computed;
+        ``overlap_at_rest`` [mm] of the deepest point, removed or not; and ``friction_work`` [N mm], the total dissipated.
         """
         comm, touched, depth, pressure = self.comm, np.zeros(len(self.points.areas), bool), 0.0, 0.0
         for one in self.now:
@@ -241,8 +239,8 @@ class ContactForces:
         self.now, self.frame, self.moved = state or self.settled
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """The trouble *diverged* where a point went through a bone since the last settled state, is pressed near the middle of one,
-        or met one with friction from too far away.
+        """The trouble *diverged* if a point went through a bone since the last settled state, is pressed near the middle of a bone,
+        or met a bone with friction from too far away.
         """
         with self.spent.on("contact"):
             through = [one for i in range(len(self.bones)) if (one := self._through(i))]
@@ -250,7 +248,7 @@ class ContactForces:
         return Trouble("diverged", why) if why else None
 
     def _yielded(self) -> list[tuple[float, str]]:
-        """The bones in which a pressed point is so deep that it could leave on any side, with its depth over half the thickness."""
+        """The bones with a pressed point so deep that it could leave on any side, with its depth over half the thickness."""
         mine, allowed = list[tuple[float, str]](), self.law.allowance(self.frame)
         for entry, one, before in zip(self.bones, self.now, self.overlaps, strict=True):
             depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))
@@ -276,15 +274,15 @@ class ContactForces:
         return max(found)[1] if found else None
 
     def _through(self, i: int) -> tuple[float, str] | None:
-        """The point that went farthest through a bone since the last settled state; None if none did. Such a point's straight
-        path in the frame of the bone is deeper inside than both of its ends and leaves on the other side.
+        """The point that went farthest through a bone since the last settled state; None without such a point. Its straight path in
+        the frame of the bone is deeper inside than both ends and leaves on the other side.
         """
         _, settled_at, settled = self.settled
         there, here = partial(self._local, i, settled_at, settled), partial(self._local, i, self.frame, self.moved)
         met, starts, ends = self.nearby[i].crossing(there, here)
         before, now = (self.bones[i].shape.sample(places) for places in (starts, ends))
         displacements = ends - starts
-        # Far away no gap is known: the outward direction is then the reverse of travel at the start and that of travel at the end.
+        # Far away no gap is known: outward is then opposite to the travel at the start, and along the travel at the end.
         outward = [
             np.where(one.gradient.any(axis=1)[:, None], one.gradient, sign * displacements)
             for one, sign in ((before, -1), (now, 1))

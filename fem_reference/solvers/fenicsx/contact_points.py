@@ -18,7 +18,7 @@ from fem_reference.solvers.fenicsx.meshes import Displacement, geometry
 @dataclass(frozen=True, eq=False)
 class ContactPoints:
     """n points of this rank's cells: their rest positions ``rest`` (n, 3) [mm], rest ``areas`` (n,) [mm2], the ``cells`` (n,) that
-    carry them, and and of the nodes of these cells the values ``basis`` (n, k) of their functions at the points, the rest positions
+    carry them; for the nodes of these cells the values ``basis`` (n, k) of their functions at the points, the rest positions
     ``nodes`` (n, k, 3) [mm] and the unknowns ``dofs`` (n, k, 3).
     """
 
@@ -64,7 +64,7 @@ class Carried:
 
 
 def on_facets(displacement: Displacement, mesh: Cells, facets: Ints, degree: int) -> ContactPoints:
-    """The quadrature points of a rule of ``degree`` on those of the ``facets`` that belong to this rank's own cells."""
+    """The quadrature points of a rule of ``degree`` on the ``facets`` that belong to this rank's own cells."""
     kind, msh = basix.CellType[mesh.kind], displacement.space.mesh
     sides = _sides(msh.topology, facets)
     side = basix.CellType.triangle if mesh.kind == "tetrahedron" else basix.CellType.quadrilateral

@@ -48,7 +48,7 @@ class Determinants:
         """``cells``: the number in the body of each cell here; ``rule``: the quadrature points (q, 3) of a ``kind`` of cell."""
         self.mesh, self.cells, self.unknowns = displacement.space.mesh, cells, displacement.unknowns.x
         vertices = reference_nodes(kind, 1)
-        # It is compiled, as each iteration needs it, by all ranks together, even those that have no cells.
+        # The expression is compiled, as each iteration needs it, by all ranks together, even ranks without cells.
         self.inside = compiling.expression(determinant, rule)
         self.at_vertices = displacement.tabulated(vertices, len(cells))
         at_vertices, slopes = geometry(self.mesh, vertices, slice(len(cells)))
@@ -61,7 +61,7 @@ class Determinants:
         return min(found, key=lambda one: (not np.isnan(one.value), one.value))
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """The trouble *inverted* where det F is not positive somewhere."""
+        """The trouble *inverted* if det F is not positive somewhere."""
         smallest = self.smallest()
         return None if smallest.value > 0 else Trouble("inverted", f"det F fell to {smallest}")
 

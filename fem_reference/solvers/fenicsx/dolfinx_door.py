@@ -8,8 +8,8 @@ from fem_reference.foundations.errors import MissingSoftware
 __all__ = ["PETSc", "dolfinx"]
 
 
-# FFCx imports numba if it is installed, for kernels that are not used here; that takes a quarter of a process's start-up time. So
-# numba is hidden during the import, unless it is loaded already.
+# FFCx imports numba if it is installed, for kernels that are not used here; this takes a quarter of a process's start-up time. So
+# numba is hidden during the import, unless it is already loaded.
 _HIDDEN = "numba" not in sys.modules
 if _HIDDEN:
     sys.modules["numba"] = None  # type: ignore[assignment]
@@ -19,7 +19,8 @@ try:
     import dolfinx
     from petsc4py import PETSc
 
-    # Where numba is loaded, this import would make the wheel's libraries global, and h5py would use the wheel's HDF5 for its own.
+    # If numba is loaded, this import would make the wheel's libraries global, and h5py would use the wheel's HDF5 instead of its
+    # own.
     if _HIDDEN:
         import dolfinx.fem.petsc
 finally:

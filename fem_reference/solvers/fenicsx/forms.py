@@ -1,4 +1,4 @@
-"""The weak form of a body, summed from its effects; symbols stand for parameters, so that one compiled form serves many."""
+"""The weak form of a body, summed from its effects; symbols stand for parameters, so that one compiled form serves many bodies."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -36,7 +36,7 @@ _FUNCTIONS = Functions(ufl.exp, ufl.ln, ufl.sqrt, ufl.cos, ufl.sin, _above)
 
 class Derivatives(NamedTuple):
     """Two compiled expressions at the quadrature points: all first derivatives of an energy, and these with the upper triangle of
-    the second ones, in the order of ``cells.c``.
+    the second derivatives, in the order of ``cells.c``.
     """
 
     first: Any
@@ -44,9 +44,9 @@ class Derivatives(NamedTuple):
 
 
 class Form:
-    """The weak form of a body. ``derivatives``: those of the energy, with ``kinds`` variables per component of the displacement;
-    effects whose amount is zero over whole frames are left out there. ``loads``: the residual of loads on the surface, 0 if there
-    are none; ``stretched``: the same for effects that store energy on the surface.
+    """The weak form of a body. ``derivatives``: derivatives of the energy, with ``kinds`` variables per component of the
+    displacement; effects with an amount of zero over full frames are left out. ``loads``: the residual of loads on the surface, 0
+    without loads; ``stretched``: the same for effects that store energy on the surface.
 
     ``energy``: the stored energy as an integral; ``determinant``: det F; ``fibre_stretch``: as the energies use it (None without
     fibres). The user sets the amounts of effects (``set_amounts``) and the time ``step`` (None if nothing depends on it).
@@ -119,7 +119,7 @@ class Form:
         return Derivatives(*compiling.expressions(first + second, self.rule[0], len(first)))
 
     def _stretched(self, acting: list[tuple[Effect, Any]], body: Body, state: State) -> Any:
-        """The energy that effects store on the surface, 0 if none does; shares in regions are linear between the vertices."""
+        """The energy that effects store on the surface, 0 without them; shares in regions are linear between the vertices."""
         stored = [effect for effect, _ in acting if isinstance(effect, Load) and effect.stored]
         shares: dict[str, Any] = {}
         for name in regions_named(stored):
@@ -142,7 +142,7 @@ class Form:
         return self.ds(list(self.regions).index(region))
 
     def _fibre(self, body: Body, cells: Ints) -> list[Any] | None:
-        """The fibre direction at the quadrature points, where an effect needs it."""
+        """The fibre direction at the quadrature points, if an effect needs it."""
         if body.fibre is None or not any("fibre" in effect.needs for effect in body.effects):
             return None
         directions = body.fibre(np.repeat(cells, len(self.rule[0])), self._places(self.rule[0], cells))
@@ -196,7 +196,7 @@ def _step(effects: list[Effect], space: fem.FunctionSpace) -> TimeStep | None:
 def _state(
     unknowns: fem.Function, fibre: list[Any] | None, step: TimeStep | None
 ) -> tuple[State, tuple[Any, Any, Any]]:
-    """The state at a point, and its variables of differentiation: F, the displacement, and the pressure where there is one."""
+    """The state at a point, and its variables of differentiation: F, the displacement, and the pressure if there is one."""
     displacement, *others = (ufl.variable(part) for part in ufl.split(unknowns))
     F = ufl.variable(ufl.Identity(3) + ufl.grad(ufl.split(unknowns)[0]))
     timed: dict[str, Any] = {"F_before": _rows(F)}
@@ -239,7 +239,7 @@ def _silent(effect: Effect, frames: tuple[float, ...]) -> list[tuple[float, floa
 
 def _differentiated(energy: Any, by: tuple[Any, Any, Any], kinds: int) -> tuple[list[Any], list[Any]]:
     """The first derivatives of ``energy`` with respect to all variables (``kinds`` per component of the displacement, then the
-    pressure), and the upper triangle of the second ones, in the order of ``cells.c``.
+    pressure), and the upper triangle of the second derivatives, in the order of ``cells.c``.
     """
     F, displacement, pressure = by
     variables: list[tuple[Any, tuple[int, ...]]] = [

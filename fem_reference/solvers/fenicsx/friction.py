@@ -1,4 +1,4 @@
-"""Friction of bones: points stick to places on a bone, and drag these places along where they slide."""
+"""Friction of bones: points stick to places on a bone, and drag these places along when they slide."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Grip:
 
 class Friction:
     """The friction of one bone by a ``law`` that has a coefficient. ``stuck`` (n, 3): the places [mm] in the frame of the bone that
-    hold the points, NaN for points that it does not press.
+    hold the points, NaN for points that are not pressed.
     """
 
     def __init__(self, law: ContactLaw, stuck: Floats) -> None:
@@ -62,7 +62,9 @@ class Friction:
         return Grip(which, -found.stiffness[:, None] * elastic, slope, here - kept[:, None] * elastic, lost)
 
     def _slip(self, which: Ints, here: Floats, gaps: Sampled, before: Before) -> tuple[Floats, Floats]:
-        """The displacement (n, 3) [mm] of the points from what holds them, and its derivative (n, 3, 3) in their places."""
+        """The displacement (n, 3) [mm] of the points from the places that hold them, and its derivative (n, 3, 3) in their
+        positions.
+        """
         slip, change = here - self.stuck[which], np.tile(np.eye(3), (len(which), 1, 1))
         new = np.flatnonzero(np.isnan(slip).any(axis=1))
         if len(new):
@@ -74,7 +76,7 @@ class Friction:
         return slip, change
 
     def settle(self, grip: Grip) -> None:
-        """Hold the points of ``grip`` from now on at the places to which it has dragged theirs, and no other points."""
+        """Hold only the points of ``grip`` from now on, at the places to which it has dragged them."""
         self.stuck[:] = np.nan
         self.stuck[grip.which] = grip.stuck
 

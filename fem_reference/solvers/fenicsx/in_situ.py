@@ -1,8 +1,8 @@
 """Equilibrium at rest of a body in situ: the stress, the extended springs and the bones' pressure that balance its tension.
 
-All three follow from a small displacement, the ``response`` of an isotropic body to the forces of the effects at rest. That body is
-supported by its attachments and springs, and by bones that act as one-sided springs: a linear problem once the points that bones
-touch are known, which Newton's method finds as an active set.
+All three follow from a small displacement, the ``response`` of an isotropic body to the forces of the effects at rest. This body is
+supported by its attachments and springs, and by bones that act as one-sided springs. The problem is linear once the touched points
+are known; Newton's method finds these as an active set.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ _SHARE = 1e-2  # the remaining residual, as a share of the tolerance of Newton's
 
 def balance(form: Form, system: System, linear: LinearSolver, residual: float) -> None:
     """Find the stress at rest of a ``form``, if it has one, up to a small share of the tolerated ``residual`` of Newton's method.
-    ArithmeticError if none is found.
+    ArithmeticError if there is none.
     """
     if form.rest is None:
         return
@@ -50,8 +50,8 @@ def balance(form: Form, system: System, linear: LinearSolver, residual: float) -
 
 
 class Supports:
-    """The bones of ``contact`` at rest, as one-sided springs of the law's stiffness at the points that touch them there, whatever
-    the smoothing. Other points within the smoothing do not count at rest.
+    """The bones of ``contact`` at rest, as one-sided springs of the law's stiffness at the points that touch them, for any
+    smoothing. Other points within the smoothing do not count at rest.
     """
 
     def __init__(self, contact: ContactForces) -> None:
@@ -77,7 +77,7 @@ class Supports:
         self.contact.settle()
 
     def springs(self, response: Floats) -> list[Pressed]:
-        """Contact with the tangent of those springs that stay in touch at a ``response`` (n,) of the unknowns."""
+        """Contact with the tangent of the springs that stay in touch at a ``response`` (n,) of the unknowns."""
         found = []
         for near, gap, normal, depth in zip(self.near, self.gaps, self.normals, self._depths(response), strict=True):
             some = np.flatnonzero(depth >= 0)
@@ -86,7 +86,7 @@ class Supports:
         return found
 
     def _depths(self, response: Floats) -> list[Floats]:
-        """The depths to which the ``response`` (n,) of the unknowns takes the points, by bone; below 0 outside it."""
+        """The depths of the points in each bone at a ``response`` (n,) of the unknowns; below 0 outside the bone."""
         moved = self.contact.points.positions(response) - self.contact.points.rest
         placed = zip(self.near, self.normals, self.touch, strict=True)
         return [np.where(touch, -np.einsum("ni,ni->n", moved[near], normal), -np.inf) for near, normal, touch in placed]

@@ -16,8 +16,8 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 
 @dataclass(frozen=True)
 class Kept:
-    """The ``folder`` that keeps the states of a run, and the ``frames`` in it. The run can continue from the last one, and use the
-    others where the same loads return. ``mesh``: the mesh's fingerprint.
+    """The ``folder`` that keeps the states of a run, and the ``frames`` in it. The run can continue from the last frame, and use
+    the others when the same loads return. ``mesh``: the mesh's fingerprint.
     """
 
     folder: Path
@@ -30,7 +30,7 @@ class Kept:
 
 
 def kept(cut_off: CutOff, body: Body) -> Kept:
-    """The states to continue from; all other files that an earlier process left in the folder are removed. There are none where
+    """The states to continue from; all other files that an earlier process left in the folder are removed. There are none if
     contact depends on earlier states (``Body.remembers``), which are not kept.
     """
     whole = Kept(cut_off.folder.resolve(), fingerprint(body.mesh.points, body.mesh.cells))
@@ -52,9 +52,9 @@ def _is_of(whole: Kept, number: int) -> bool:
 @dataclass(frozen=True, eq=False)
 class Job:
     """A ``body`` and how to solve it. ``samples``: by name, the cell (n,) of each point and the rest points (n, 3) whose positions
-    are requested. Only a muscle has them; forces at edges that attachments share are then divided between these. ``kept``: the
-    states that are kept, if any. InputError if stable states are to be followed with friction, as stability under friction is
-    not known.
+    are requested. Only a muscle has samples; forces at edges shared by attachments are then divided between the attachments.
+    ``kept``: the states that are kept, if any. InputError if stable states are to be followed with friction, as stability under
+    friction is not known.
     """
 
     body: Body

@@ -1,4 +1,4 @@
-"""Linear systems solved with a sparse factorisation (MUMPS), which serves as long as it is a good preconditioner."""
+"""Linear systems solved with a sparse factorisation (MUMPS), used as long as it is a good preconditioner."""
 
 from itertools import count
 
@@ -8,11 +8,11 @@ from petsc4py import PETSc
 from fem_reference.solvers.fenicsx.spent import Spent
 
 # Indices of MUMPS's INFOG: the error, and the number of negative pivots. Of its ICNTL: the last front on one process, as its pivots
-# are not counted otherwise; and the memory beyond the estimate, in per cent.
+# are otherwise not counted; and the memory beyond the estimate, in per cent.
 _ERROR, _NEGATIVE, _ROOT_BY_ONE, _MORE_MEMORY = 1, 12, 13, 14
 _FLOPS, _ENTRIES = 3, 29  # indices of RINFOG, the operations of a factorisation, and INFOG, the entries of its factors
-# Above this number of unknowns the factors are compressed by blocks (BLR: ICNTL(35)), up to an error of 1e-5 (CNTL(7)). That halves
-# the time of a factorisation at 170 000 unknowns and gains nothing at 16 000.
+# Above this number of unknowns the factors are compressed by blocks (BLR: ICNTL(35)), up to an error of 1e-5 (CNTL(7)). Compression
+# halves the time of a factorisation at 170 000 unknowns and gains nothing at 16 000.
 _COMPRESSED_FROM, _COMPRESSION, _DROPPED = 80_000, 35, 7
 # Per entry of the factors, a back-substitution takes as long as this number of operations of a factorisation, as measured on meshes
 # of 16 000 and of 200 000 unknowns.
@@ -46,8 +46,9 @@ def iterate(krylov: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, mos
 
 
 class Factorised:
-    """Solves with the present ``matrix``. If ``lagged``, by FGMRES preconditioned with an older factorisation, replaced once its
-    iterations, for one system or all since, took longer than a new one. The factors are LDL^T of a symmetric matrix, else LU.
+    """Solves with the present ``matrix``. If ``lagged``, by FGMRES preconditioned with an older factorisation, which is replaced
+    once its iterations, for one system or all since, took longer than a new factorisation. The factors are LDL^T for a symmetric
+    matrix, else LU.
     """
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, lagged: bool, precision: str, spent: Spent) -> None:
@@ -77,7 +78,7 @@ class Factorised:
 
     @property
     def fresh(self) -> bool:
-        """True if the factors are those of the present matrix."""
+        """True if the factors belong to the present matrix."""
         return self.factorised == self.matrix.stateGet()
 
     def solve_exactly(self) -> bool:
@@ -90,7 +91,7 @@ class Factorised:
         return True
 
     def factorise(self) -> None:
-        """Factorise the present matrix; ``LinearSolveError`` where this fails."""
+        """Factorise the present matrix; ``LinearSolveError`` if this fails."""
         if self.entries != self.matrix.getInfo()["nz_used"]:  # a matrix that has grown needs new factors
             self._choose(self.precision)
         options = PETSc.Options(self.krylov.getOptionsPrefix())
@@ -114,7 +115,7 @@ class Factorised:
         self.limit = int(min(max(operations / entries / _OPERATIONS, _LEAST), _MOST))
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
-        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``, or exactly; ``LinearSolveError`` where this fails."""
+        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``, or exactly; ``LinearSolveError`` if this fails."""
         if not self.lagged:
             tolerance = _EXACT
         # A factorisation whose iterations took as long as a new one is replaced: that takes at most twice the least possible time.
@@ -132,7 +133,7 @@ class Factorised:
 
     def negative_pivots(self) -> int:
         """The number of negative pivots of the present matrix, which is factorised if necessary. Where single precision does not
-        resolve the softest directions, double precision is used from then on. ``LinearSolveError`` where it cannot be factorised.
+        resolve the softest directions, double precision is used from then on. ``LinearSolveError`` if it cannot be factorised.
         """
         if not self.fresh:
             self.factorise()

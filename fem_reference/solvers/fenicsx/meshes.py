@@ -43,7 +43,7 @@ def with_vertices() -> tuple[Floats, Floats]:
     """18 points on the unit tetrahedron, exact to degree 5: vertices, twice 4 on the medians and 6 on the bimedians.
 
     The shares and coordinates solve the seven moment equations of degrees 0, 2, 3, 4, 4, 5 and 5 for the given share of a vertex;
-    for a share of 0 they are those of Walkington 2000, Quadrature on simplices of arbitrary dimension.
+    for a share of 0 they agree with Walkington 2000, Quadrature on simplices of arbitrary dimension.
     """
     points, weights = [np.eye(4, 3, -1)], [np.full(4, _VERTEX_SHARE)]
     for share, a in _ON_MEDIANS:

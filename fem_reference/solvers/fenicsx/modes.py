@@ -15,7 +15,7 @@ from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
 from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 
 _ITERATIONS = 40  # iterations of inverse iteration
-_LARGER = (1, 2, 4, 8)  # factors of the perturbation, tried in turn where the state returns or no solution is found
+_LARGER = (1, 2, 4, 8)  # factors of the perturbation, tried in turn if the state returns or no solution is found
 _SHIFT, _GROWTH = 1e-6, 4.0
 _DIFFERENCE = 1e-3  # of the smallest load step: the interval for differences along the path
 # The greatest reported distance to a limit point, in smallest load steps. The step that failed was up to two of them long, and the
@@ -27,7 +27,7 @@ _SOFT = 0.3  # The largest share of its stiffness at rest that the softest mode 
 def softest(body: AssembledBody, linear: LinearSolver) -> PETSc.Vec:
     """The mode of the least eigenvalue, by magnitude, of the matrix of ``linear``; its displacements have length 1.
 
-    It is found by inverse iteration from a random start; displacements alone have a mass. ``LinearSolveError`` where none is free.
+    It is found by inverse iteration from a random start; displacements alone have a mass. ``LinearSolveError`` if none is free.
     """
     moves = _free(body)
     if not body.comm.allreduce(moves.any(), MPI.LOR):
@@ -60,8 +60,8 @@ def _displacements(body: AssembledBody, mode: PETSc.Vec) -> Floats:
 
 
 def leave(body: AssembledBody, frame: float, share: float) -> float | None:
-    """Perturb the present state, that of ``frame``, by a ``share`` of the body's size along its lowest mode, and solve again until
-    there are fewer negative modes. Returns the perturbation [mm], None if the state is stable or no other was found. Collective.
+    """Perturb the present state, at ``frame``, by a ``share`` of the body's size along its lowest mode, and solve again until there
+    are fewer negative modes. Returns the perturbation [mm], None if the state is stable or no other state was found. Collective.
     """
     if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
         return None
@@ -83,7 +83,7 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
 
 def _lowest(body: AssembledBody, pressures: int) -> Floats:
     """The displacement of the unknowns (n,), 1 mm at most, along which the energy falls most, by inverse iteration with a shift
-    that leaves the tangent no negative pivots but those of its ``pressures``.
+    that leaves the tangent no negative pivots except those of its ``pressures``.
     """
     system, free, dofs = body.system, _free(body), body.displacement.dofs
     system.linearise()
@@ -128,7 +128,7 @@ def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
     none or it cannot be known. Collective.
 
     Before a limit point the least eigenvalue of the tangent falls as the square root of the remaining path. So its square is
-    linear, and the remaining path is half of the eigenvalue divided by its slope along the path, that of a Newton step.
+    linear, and the remaining path is half of the eigenvalue divided by its slope along the path, as in a Newton step.
     """
     if body.stability is None or body.clock.matters:
         return None

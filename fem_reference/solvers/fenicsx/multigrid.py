@@ -39,7 +39,7 @@ class Multigrid:
         self.stale, self.first = True, 0
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
-        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where this fails."""
+        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` if this fails."""
         fresh = self.stale
         if fresh:
             self._renew()
@@ -109,7 +109,7 @@ class Multigrid:
 
     def _interpolation(self, displaced: Ints) -> tuple[PETSc.Mat, Ints]:
         """The interpolation from the linear to the quadratic element on the same cells, 0 for prescribed unknowns; and the fixed
-        unknowns of the linear element: those at corners where the quadratic element's is fixed.
+        unknowns of the linear element: at corners where the unknown of the quadratic element is fixed.
         """
         space, parents = self.system.unknowns.function_space.sub(0).collapse()
         corners = interpolation_matrix(fem.functionspace(space.mesh, ("Lagrange", 1, (3,))), space)
@@ -123,7 +123,7 @@ class Multigrid:
         return self._matrix(csr_array(found)), fixed
 
     def _schur(self) -> PETSc.Mat:
-        """Minus the mass matrix of the pressure, divided by local stiffness, in place of the Schur complement."""
+        """Minus the mass matrix of the pressure, divided by local stiffness, instead of the Schur complement."""
         system, cells = self.system, self.system.cells
         blocks = cells.softness() * system.tangent.unit**2
         names = self.number[cells.unknowns[:, 3 * cells.nodes :]]

@@ -1,4 +1,4 @@
-"""Newton's method: inexact where exactness costs more than it saves, and damped where a full step would invert a cell."""
+"""Newton's method: inexact if this saves time, and damped if a full step would invert a cell."""
 
 import numpy as np
 
@@ -17,16 +17,16 @@ _KEPT, _SHORTEST = 0.1, 1e-2
 # Eisenstat and Walker 1996 (doi 10.1137/0917003), choice 2: the tolerance of the first linear system, then the factor of later
 # tolerances and their bounds.
 _FIRST, _FACTOR, _LOOSEST, _TIGHTEST = 1e-3, 0.5, 1e-3, 1e-9
-# Newton's method gives up if within ``_PATIENCE`` iterations the residual did not fall to ``_PROGRESS`` times its earlier best.
+# Newton's method gives up if the residual did not fall to ``_PROGRESS`` times its earlier best within ``_PATIENCE`` iterations.
 _PATIENCE, _PROGRESS = 6, 0.5
-# A linear solution that would end below the target of Newton's method goes on to this share of the target: the residual of the last
-# linear system is that of the whole iteration.
+# A linear solution that would end below the target of Newton's method continues to this share of the target, as the residual of the
+# last linear system is the residual of the entire iteration.
 _PAST = 1e-2
 
 
 class Newton:
     """Newton's method on a ``system``, in full steps by ``linear``. A line search would weigh forces [N] against volumes [mm3], and
-    would stall where bodies bend or are soft.
+    would stall if bodies bend or are soft.
     """
 
     def __init__(
@@ -38,9 +38,9 @@ class Newton:
         self.thrown = 0
 
     def solve_among(self, contact: ContactForces | None, frame: float) -> Attempt:
-        """Solve as ``solve`` does; first without ``contact`` where the present state has no contact pressure. That result stands
-        where it converged without contact pressure: contact would give the same one. Else it is discarded, and its iterations count
-        as ``thrown``, as they do not show how hard the load step is.
+        """Solve as ``solve`` does; first without ``contact`` if the present state has no contact pressure. If the result also has
+        none, it is final, as contact would give the same result. Otherwise it is discarded, and its iterations count as ``thrown``,
+        as they do not show how hard the load step is.
         """
         system, before = self.system, np.array(self.system.unknowns.x.array)
         system.contact = contact if contact and contact.presses() else None
@@ -59,7 +59,7 @@ class Newton:
         return self.solve(frame)
 
     def solve(self, frame: float) -> Attempt:
-        """Solve at ``frame``. The attempt ends where even the shortest step inverts a cell."""
+        """Solve at ``frame``. The attempt ends if even the shortest step inverts a cell."""
         smallest, last = self.determinants.values_now(), np.nan
         residuals = [self._begin(frame)]
         while not residuals[-1] <= self.residual or self.system.lacking():
@@ -92,7 +92,7 @@ class Newton:
         return None
 
     def _failed(self, residuals: list[float], why: str) -> Attempt:
-        """The record of a failed attempt: inverted where det F is not positive in its last state."""
+        """The record of a failed attempt: inverted if det F is not positive in its last state."""
         status: Status = "diverged" if self.determinants.smallest().value > 0 else "inverted"
         return Attempt(status, len(residuals) - 1, tuple(residuals), f"Newton's method {why}")
 

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx.facets import Facets
 
-# Facets do not face each other where the cosine between their normals is above this; others may in places, as they bend.
+# Facets do not face each other if the cosine between their normals is above this; other facets may in places, as they bend.
 _ALIKE = 0.5
 
 
@@ -27,7 +27,7 @@ class OwnPairs:
 
     def near(self, balls: tuple[Floats, Floats], reach: Floats, *states: Floats) -> tuple[Ints, Ints]:
         """The facets (p,) whose ``balls``, middles (m, 3) and radii (m,) [mm], come within ``reach`` (m,) of the middles of other
-        facets (p,): those that they face in one of the ``states``, nodes (m, k, 3) [mm], and share no node with.
+        facets (p,) that they face in one of the ``states``, nodes (m, k, 3) [mm], and with which they share no node.
         """
         middles, radii = balls
         found = cKDTree(middles).query_ball_point(middles, reach + radii.max())

@@ -1,4 +1,4 @@
-"""States of a body: signs of a jump between successive ones, and earlier ones that are used again."""
+"""States of a body: signs of a jump between successive states, and the reuse of earlier states."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,8 +13,8 @@ from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme
 from fem_reference.solvers.fenicsx.system import System
 
 # On the straight line from one state to the next, det F is a cubic along the line and has to stay above this share of the lesser of
-# its end values. A turn by 143 degrees within a step reduces it to a tenth; half a turn, or a mirrored state on the line, to 0 or
-# below.
+# its end values. A turn by 143 degrees within a step reduces det F to a tenth; half a turn, or a mirrored state on the line, to 0
+# or below.
 KEPT = 0.1
 _SHARES = (0.0, 1 / 3, 2 / 3, 1.0)
 _CUBIC = np.linalg.inv(np.vander(_SHARES, 4))  # converts values at these shares to the coefficients of a cubic
@@ -36,7 +36,7 @@ class Path:
 
     def jumped(self, before: Floats) -> Extreme | None:
         """The least det F, relative to its end values, on the straight line from the unknowns ``before`` to the present ones; None
-        where more than ``KEPT`` is left. A body that deforms steadily in small steps never falls that low.
+        if more than ``KEPT`` is left. In a body that deforms steadily in small steps det F never falls that low.
         """
         unknowns = self.system.unknowns.x
         after, values = np.array(unknowns.array), []
@@ -49,7 +49,7 @@ class Path:
         return None if found.value > KEPT else found
 
     def trouble(self, before: Floats, /) -> Trouble | None:
-        """The trouble *diverged* where the step from the unknowns ``before`` leads to another path."""
+        """The trouble *diverged* if the step from the unknowns ``before`` leads to another path."""
         jump = self.jumped(before)
         if jump is None:
             return None
@@ -58,14 +58,14 @@ class Path:
         return Trouble("diverged", f"to a state on another path: {way} {jump.value:.2g} of itself, {place}")
 
     def settle(self, energy: float, halfway: Callable[[], bool] | None = None, *, connected: bool = True) -> None:
-        """Take the present state as the next one, with the stored ``energy`` [N mm]; where it is ``connected`` with the state
-        before, compare the growth of the energy with the work of the internal forces, by the trapezoidal rule.
+        """Take the present state as the next one, with the stored ``energy`` [N mm]; if it is ``connected`` with the previous
+        state, compare the growth of the energy with the work of the internal forces, by the trapezoidal rule.
 
-        The rule is exact where forces are linear in the displacement, and its error falls with the square of the step: for a law
-        that stiffens, or a rotation, it is off by tenths of the energy in the first step from rest. So beyond ``ENERGY_GAP`` the
+        The rule is exact if forces are linear in the displacement, and its error is of second order in the step: for a law that
+        stiffens, or a rotation, its error is tenths of the energy in the first step from rest. So beyond ``ENERGY_GAP`` the
         function ``halfway`` solves for a state halfway, puts it into the unknowns, which are restored afterwards, and returns True
-        if it was found. Then Simpson's rule applies, whose error falls with the fourth power. In a jump the energy falls without
-        work, by either rule. ``gap`` is the greatest difference since ``gap`` was last read, over the greatest energy so far.
+        if it was found. Then Simpson's rule is used, whose error is of fourth order. In a jump the energy falls without work by
+        either rule. ``gap`` is the greatest difference since ``gap`` was last read, over the greatest energy so far.
         """
         states = [
             (self.unknowns, self.forces),
@@ -98,13 +98,13 @@ class Path:
 
 def _products(states: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
     """Forces, and the displacements along which they work: straight lines between two ``states``, or parabolas over time through
-    three. The work along these is that of Simpson's rule, which is exact for them.
+    three. The work along these follows from Simpson's rule, which is exact for them.
     """
     if len(states) == 2:
         (start, first), (end, last) = states
         return [((first + last) / 2, end - start)]
     (start, first), (between, middle), (end, last) = states
-    bend = 4 * between - start - end  # the rates at the ends, times the whole time, are bend - 2 start and 2 end - bend
+    bend = 4 * between - start - end  # the rates at the ends, times the total time, are bend - 2 start and 2 end - bend
     return [(first / 6, bend - 2 * start), (4 * middle / 6, end - start), (last / 6, 2 * end - bend)]
 
 
@@ -137,7 +137,7 @@ class KnownState:
 
 
 class Known:
-    """The states of a run so far; which ones are kept is the same on all ranks of ``comm``."""
+    """The states of a run so far; the same states are kept on all ranks of ``comm``."""
 
     def __init__(self, comm: MPI.Comm) -> None:
         self.comm = comm

@@ -19,8 +19,7 @@ from fem_reference.foundations.subprocesses import command, environment, process
 from fem_reference.runs.contents import Status
 from fem_reference.runs.store import Frame, Outcome, Sink
 
-# One thread per rank. Unless these variables are set, Open MPI, where it is used, refuses to run as root or with more ranks than
-# cores.
+# One thread per rank. Unless these variables are set, Open MPI, if used, refuses to run as root or with more ranks than cores.
 _SETTINGS = {
     "OMP_NUM_THREADS": "1",
     "PYTHONUNBUFFERED": "1",
@@ -28,12 +27,12 @@ _SETTINGS = {
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
 }
-# The number of ranks that is accepted on any machine; more are accepted only on a machine with as many cores.
+# The number of ranks that is accepted on any machine; more ranks need a machine with as many cores.
 _MOST_RANKS = 8
 PATIENCE = 5.0  # [s] between the request to end a process and its being killed
 # The allowed clock time, as a multiple of the limit of processor time plus the start-up time; a run beyond it allows no conclusion.
 CLOCK, _START = 20, 3.0  # [s]
-_GLANCE = 0.02  # [s] between looks at the processor time
+_GLANCE = 0.02  # [s] between checks of the processor time
 MARK = "@fem_reference "  # begins each line of output that names the file of a pickled frame or outcome
 
 
@@ -80,7 +79,7 @@ class Process:
         )
         streams = self.process.stdin, self.process.stdout, self.process.stderr
         self.input, self.output, self.error_output = (stream for stream in streams if stream)  # each is a pipe
-        self.overran: tuple[Status, str] | None = None  # the reason where a time limit ended it
+        self.overran: tuple[Status, str] | None = None  # the reason if a time limit ended it
         self.errors: list[str] = []
         said = (line for line in self.error_output if line.strip())
         self.listener = threading.Thread(target=self.errors.extend, args=(said,))
@@ -92,7 +91,7 @@ class Process:
         """
         kept = "no frame was reached"
         with self._limited(time_limit):
-            with suppress(BrokenPipeError):  # a dead process reads nothing; its exit status is looked at below
+            with suppress(BrokenPipeError):  # a dead process reads nothing; its exit status is checked below
                 self.input.write(f"{job}\n")
                 self.input.flush()
             for line in self.output:
@@ -119,8 +118,8 @@ class Process:
 
     @contextmanager
     def _limited(self, time_limit: float | None) -> Iterator[None]:
-        """End it where one of its processes meanwhile takes more than ``time_limit`` [s] of processor time, independent of other
-        load on the machine. After ``CLOCK`` times that by the clock it is ended too, which allows no conclusion.
+        """End it if one of its processes takes more than ``time_limit`` [s] of processor time, independent of other load on the
+        machine. It is also ended after ``CLOCK`` times this by the clock, which allows no conclusion.
         """
         if time_limit is None:
             yield

@@ -12,13 +12,13 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
-# Below this number of unknowns a factorisation costs no more than a few iterations of an iterative solver.
+# Below this number of unknowns a factorisation takes no longer than a few iterations of an iterative solver.
 SMALL = 4000
 # From this number of unknowns on, multigrid is faster than one factorisation per frame.
 LARGE = 350_000
-# Memory [MB] of a process without a body, of each unknown besides its factors, of each unknown in all with multigrid, and of the
-# factors of 16 000 unknowns in double precision; and the power by which these grow. Measured on gluteus_maximus from 16 000 to 560
-# 000 unknowns. MUMPS allocates more than it uses.
+# Memory [MB] of a process without a body, of each unknown besides its factors, of each unknown in total with multigrid, and of the
+# factors of 16 000 unknowns in double precision; and the power with which factors grow. Measured on gluteus_maximus from 16 000 to
+# 560 000 unknowns. MUMPS allocates more than it uses.
 _EMPTY, _EACH, _EACH_MULTIGRID, _FACTORS, _POWER = 250.0, 6.5e-3, 1e-2, 60.0, 1.38
 # The most bytes of states, over all frames, that a run keeps by default.
 MOST_STATES = 2**26
@@ -68,8 +68,8 @@ def available() -> float:
 
 
 def planned[S: BodySettings](settings: S, cells: Cells, free: float) -> S:
-    """The settings with a linear solver and its precision: the requested ones, or those that the size suggests and that fit into
-    the ``free`` megabytes. InputError if none fits.
+    """The settings with a linear solver and its precision: as requested, or as the size suggests and the ``free`` megabytes allow.
+    InputError if nothing fits.
     """
     count = unknowns(cells, settings.element)
     for kind in [settings.linear_solver] if settings.linear_solver else _fitting(settings.element, count):

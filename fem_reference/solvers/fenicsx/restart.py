@@ -1,4 +1,4 @@
-"""The states of a run on disk, bit by bit: a process that reads them continues exactly as the writer would have.
+"""The states of a run on disk, bit by bit: a process that reads them continues exactly as the writing process would have.
 
 <run>/restart/frame_0010.npz   the unknowns and the arrays of the clock, (n,) in the order of the body's cells; ``facts``, in JSON
 """
@@ -50,7 +50,7 @@ class Restart:
         return " ".join([*map(repr, self.body.effects), law])
 
     def write(self, frame: float, facts: dict[str, Any]) -> None:
-        """Store the present state, that of ``frame``, with the facts on the run so far."""
+        """Store the present state, at ``frame``, with the facts on the run so far."""
         body = self.body
         arrays = {"unknowns": body.unknowns.x.array} | body.clock.arrays()
         stored: dict[str, Any] = {name: self._gathered(values) for name, values in arrays.items()}
@@ -61,8 +61,8 @@ class Restart:
             write_arrays(self.kept.place(frame), stored)
 
     def good(self) -> tuple[int, ...]:
-        """The frames of the states to continue from: all of them; if other effects acted then, only those before the first that is
-        no longer in equilibrium, and none where rates matter. The body is restored afterwards.
+        """The frames of the states to continue from: all of them; if other effects acted then, only frames before the first that is
+        no longer in equilibrium, and none if rates matter. The body is restored afterwards.
         """
         body, found = self.body, list[int]()
         rest, at = np.array(body.unknowns.x.array), body.at
@@ -82,7 +82,7 @@ class Restart:
         return tuple(found)
 
     def _read(self, frame: int) -> tuple[dict[str, Floats], dict[str, Any]]:
-        """This rank's arrays of a state, and its facts."""
+        """The arrays of this rank for a state, and its facts."""
         arrays = read_arrays(self.kept.place(frame))
         facts = json.loads(str(arrays.pop("facts")))
         mine = {name: np.zeros(len(self.body.unknowns.x.array)) for name in arrays}
@@ -91,7 +91,7 @@ class Restart:
         return mine, facts
 
     def go_on(self, frames: tuple[int, ...]) -> dict[str, Any]:
-        """Take up the state of the last of the ``frames`` and register the others; returns the facts stored with it."""
+        """Restore the state of the last of the ``frames`` and register the others; returns the facts stored with it."""
         body, facts = self.body, dict[str, Any]()
         for frame in frames:
             arrays, facts = self._read(frame)

@@ -1,4 +1,4 @@
-"""Sessions: one FEniCSx process that solves problem after problem, and reuses what it has compiled and loaded."""
+"""Sessions: one FEniCSx process that solves one problem after another, and reuses compiled and loaded code."""
 
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -46,8 +46,8 @@ class Session:
         return self.run(Job(body, settings), settings.time_limit, sink)
 
     def run(self, job: Job | FieldProblem, time_limit: float | None, sink: Sink) -> Outcome:
-        """Solve the ``job`` and pass each frame to ``sink``. No exception is raised where the process dies, which is the status
-        *crashed*, or is ended at the time limit, which is *timed out* or *stalled*. RuntimeError once the session is closed.
+        """Solve the ``job`` and pass each frame to ``sink``. No exception is raised if the process dies (status *crashed*) or is
+        ended at the time limit (*timed out* or *stalled*). RuntimeError once the session is closed.
         """
         if self.closed:
             raise RuntimeError("the session is closed")
@@ -86,8 +86,8 @@ _shared: ContextVar[Session | None] = ContextVar("shared", default=None)
 
 @contextmanager
 def shared() -> Iterator[None]:
-    """A context in which all solutions on one rank run in one process, which reuses what it has loaded and compiled; a process that
-    is already shared remains in use. Without FEniCSx nothing is shared.
+    """A context in which all solutions on one rank run in one process, which reuses loaded and compiled code; a process that is
+    already shared remains in use. Without FEniCSx nothing is shared.
     """
     with session() if installed() and _shared.get() is None else nullcontext(_shared.get()) as own:
         before = _shared.set(own)

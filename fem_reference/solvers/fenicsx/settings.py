@@ -13,21 +13,21 @@ from fem_reference.solvers.common.protocol import Trade
 class BodySettings(Record):
     """Numerics of a body; steps are in frame numbers.
 
-    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step: it grows by half after an easy
-    step (at most 5 Newton iterations), up to ``largest_step`` where there is one, and is halved when Newton needs more than
-    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's iteration ends when the norm of the nodal forces and of
-    the volume equation is at most this. ``quadrature_degree``: the degree of the polynomials that are integrated exactly on a
+    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step. It grows by half after an easy
+    step (at most 5 Newton iterations), up to ``largest_step`` if given, and is halved if Newton's method needs more than
+    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal forces and of
+    the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are integrated exactly on a
     straight cell, by default as the element requires. ``linear_solver`` of Newton's method: ``"direct"``, a new factorisation and
     an exact solution for each system; ``"lagged"``, inexact FGMRES preconditioned with a factorisation that is kept until a new one
-    is cheaper, and exact solutions before a run ends ``out of steps``; the default depends on the size. ``precision``: that of
-    factorisations, by default double for direct and single for lagged ones. Both settings change the time but not the result.
-    ``follow``: ``"equilibrium"``, whichever one Newton's method finds, or ``"stable"``: at a frame with an unstable equilibrium
-    (only where negative modes are counted) the body is moved along its lowest mode by a ``perturbation``, a share of its size, and
-    solved again; the perturbation is reversed and enlarged, up to eight times, until there are fewer negative modes. ``reuse``: use
-    the state of an earlier frame with the same load again. ``time_limit``: the limit of processor time of a rank, by default none;
-    after twenty times that by the clock the status is *stalled*, which allows no conclusion. ``store_state``: each frame also
-    stores the unknowns of every cell, from which ``results`` evaluates stress, pressure, det F and fibre stretch; by default only
-    for a muscle, if those of all frames take at most 64 MB.
+    is cheaper, and exact solutions before a run ends ``out of steps``; the default depends on the size. ``precision``: of
+    factorisations, by default double if direct and single if lagged. Both settings change the time but not the result. ``follow``:
+    ``"equilibrium"``, any that Newton's method finds, or ``"stable"``: at a frame with an unstable equilibrium (only if negative
+    modes are counted) the body is moved along its lowest mode by a ``perturbation``, a share of its size, and solved again; the
+    perturbation is reversed and enlarged, up to eight times, until there are fewer negative modes. ``reuse``: use the state of an
+    earlier frame with the same load again. ``time_limit``: the limit of processor time of a rank, by default none; after twenty
+    times this limit by the clock the status is *stalled*, which allows no conclusion. ``store_state``: each frame also stores the
+    unknowns of every cell, from which ``results`` evaluates stress, pressure, det F and fibre stretch; by default only for a muscle
+    whose frames together take at most 64 MB.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
@@ -47,8 +47,8 @@ class BodySettings(Record):
 
 
 class Settings(BodySettings):
-    """Numerics of a muscle. ``ranks``: MPI processes, by default one, or two where that is faster and cores are free; they change
-    the time, not the result.
+    """Numerics of a muscle. ``ranks``: MPI processes, by default one, or two if faster and cores are free; they do not change the
+    result.
     """
 
     ranks: int | None = Field(default=None, gt=0, le=1024)

@@ -10,8 +10,8 @@ class Stability:
     """The inertia of the tangent of a ``system``, from an LDL^T factorisation that ``linear`` uses afterwards.
 
     An unknown pressure p has the energy ``p (J - 1) - p^2 / 2K``, which gives one negative pivot, -1/K. The other negative pivots
-    are the negative modes of the displacement, with the pressure that belongs to it (Haynsworth 1968,
-    doi 10.1016/0024-3795(68)90050-5). Prescribed unknowns have pivots of 1.
+    are the negative modes of the displacement, with the corresponding pressure (Haynsworth 1968, doi 10.1016/0024-3795(68)90050-5).
+    Prescribed unknowns have pivots of 1.
     """
 
     def __init__(self, system: System, linear: Factorised) -> None:
@@ -20,10 +20,11 @@ class Stability:
         self.pressures = space.sub(1).collapse()[0].dofmap.index_map.size_global if space.num_sub_spaces > 1 else 0
 
     def of_material(self) -> float:
-        """The number of negative modes that the material has for certain: those along which the energy falls even if the pressure
-        follows the volume at every point. Pressures of an element control the volume on average only: shrinking in one place and
-        swelling in another costs nothing, and under a stress of several shear moduli the energy may fall in that way although the
-        material's own does not. The elements' displacements are a subset of the body's, so the body has at least this many modes.
+        """The number of negative modes that the material certainly has: modes along which the energy falls even if the pressure
+        follows the volume at every point. An element with a pressure controls the volume on average only: shrinking in one place
+        and swelling in another needs no energy, and under a stress of several shear moduli the energy may fall in such modes
+        although the energy of the material does not. The elements' displacements are a subset of the body's, so the body has at
+        least this many modes.
         """
         found = self.negative_modes(pointwise=self.pressures > 0)
         self.negative_modes()  # restores the tangent and its factors for the next solve

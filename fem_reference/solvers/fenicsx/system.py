@@ -27,8 +27,8 @@ _ROUNDING = 1e-11  # [mm], the rounding of positions
 
 
 class System:
-    """Residual ``b`` and tangent ``matrix`` of the ``unknowns``. Prescribed ones are eliminated: their residual is 0, and their row
-    and column of the tangent have only a 1 on the diagonal.
+    """Residual ``b`` and tangent ``matrix`` of the ``unknowns``. Prescribed unknowns are eliminated: their residual is 0, and their
+    row and column of the tangent have only a 1 on the diagonal.
     """
 
     def __init__(self, form: Form, conditions: list[PrescribedRegion | PointSprings], spent: Spent) -> None:
@@ -118,7 +118,7 @@ class System:
             return self._finish(tractions, moves)
 
     def _finish(self, tractions: Tractions | None, moves: Floats | None) -> float:
-        """Add all terms but those of cells, and the parts of other ranks; return the norm of the residual."""
+        """Add all terms except those of cells, and the parts of other ranks; return the norm of the residual."""
         for terms in self.surface:
             terms.add_residual(self.work.array, moves)
         for tie in self.ties:
@@ -134,8 +134,8 @@ class System:
         return norm
 
     def balance_units(self) -> None:
-        """Choose from the present tangent a unit of pressure with which volumes [mm3] and forces [N] have equal weight in linear
-        systems, and so have pressures and displacements [mm].
+        """Choose from the present tangent a unit of pressure that gives volumes [mm3] and forces [N], and pressures and
+        displacements [mm], equal weight in linear systems.
         """
         space = self.unknowns.function_space
         if space.num_sub_spaces == 1:
@@ -214,7 +214,7 @@ def reactions(
 ) -> tuple[dict[str, Floats], dict[str, Floats]]:
     """The force (3,) [N] of each constraint in a ``system`` and of each bone in ``contact``, by name, on the body, and its moment
     (3,) [N mm] about the origin. The force at an unknown of several regions is ``divided`` between them, so that all forces
-    balance, or else counts in each.
+    balance; otherwise it counts in each region.
     """
     residual, now, comm = system.reactions(), system.unknowns.x.array, system.unknowns.function_space.mesh.comm
     shared = np.zeros(len(now), np.int64)

@@ -34,14 +34,8 @@ class TouchingForces:
 
     def __init__(self, body: Body, form: Form, displacement: Displacement, spent: Spent) -> None:
         """ArithmeticError where parts overlap at rest by more than the smoothing."""
-        self.unknowns, self.spent, self.passes = displacement.unknowns, spent, list[Pass]()
-        for law in body.touching:
-            names = dict.fromkeys((law.one, law.other))
-            parts = {name: facets_of(displacement, body.mesh, form.regions[name]) for name in names}
-            low, high = parts[law.one], parts[law.other]
-            both = [(low, high, law.forces), (high, low, law.forces[::-1])]
-            self.passes += [Pass(law, *one) for one in both] if low is not high else [Pass(law, *both[0])]
-        self.rims = self._rims(body, displacement)
+        self.unknowns, self.spent = displacement.unknowns, spent
+        self.passes, self.rims = self._passes(body, form, displacement)
         self.now = list[tuple[Met, PressedPoints]]()
         self.seen = np.full(len(self.unknowns.x.array), np.nan)
         self.rubbing = [Rubbing(one, len(self.seen)) if one.law.friction else None for one in self.passes]
@@ -77,14 +71,26 @@ class TouchingForces:
         """The shares of overlaps at rest that are subtracted."""
         return [one.share for one in self.passes]
 
-    def _rims(self, body: Body, displacement: Displacement) -> list[Pass | None]:
-        """For each pass, the skin around the other part, which the points of the pass may not touch; None where there is none."""
-        pairs = [pair for law in body.touching for pair in {(law.one, law.other): 0, (law.other, law.one): 0}]
-        around = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for pair in pairs])
-        return [
-            Pass(one.law, one.side, facets_of(displacement, body.mesh, facets), pair) if len(facets) else None
-            for one, facets, pair in zip(self.passes, around, pairs, strict=True)
-        ]
+    @staticmethod
+    def _passes(body: Body, form: Form, displacement: Displacement) -> tuple[list[Pass], list[Pass | None]]:
+        """The passes of both sides of each law, one where a part touches itself; and by pass the skin around the other part that
+        its points may not touch, None where there is none, or where it is felt.
+        """
+        both = ((law, dict.fromkeys(((law.one, law.other), (law.other, law.one)))) for law in body.touching)
+        sides = [(law, *pair) for law, pairs in both for pair in pairs]
+        skins = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for _, *pair in sides])
+        facets = partial(facets_of, displacement, body.mesh)
+        own, passes, rims = (
+            {name: facets(form.regions[name]) for _, name, _ in sides},
+            list[Pass](),
+            list[Pass | None](),
+        )
+        for (law, one, other), around in zip(sides, skins, strict=True):
+            felt = law.around and len(around) > 0
+            skin = facets(np.concatenate([form.regions[other], around])) if felt else own[other]
+            passes.append(Pass(law, own[one], skin, (one, other)))
+            rims.append(Pass(law, own[one], facets(around), (one, other)) if len(around) and not felt else None)
+        return passes, rims
 
     def look(self) -> None:
         """Find the contact at the present unknowns, unless they are those of the last search."""
@@ -134,8 +140,9 @@ class TouchingForces:
         for one, (met, contact), rubbed in zip(self.passes, self.now, self.rubbed, strict=True):
             if one.own is not None:  # the forces of a part on itself sum to 0
                 continue
-            forces = contact.forces[:, None] * met.there.normal  # on the points
-            for sign, name, places in ((1, one.names[0], met.here.point), (-1, one.names[1], met.there.point)):
+            forces, (here, there) = contact.forces[:, None] * met.there.normal, one.names  # on the points
+            both = (1, f"{there} on {here}", met.here.point), (-1, f"{here} on {there}", met.there.point)
+            for sign, name, places in both:
                 force, moment = found.get(name, (np.zeros(3), np.zeros(3)))
                 pull = sign * forces
                 found[name] = force + pull.sum(axis=0), moment + np.cross(places, pull).sum(axis=0)
@@ -203,14 +210,16 @@ class TouchingForces:
         self.look()
         columns = self.passes, self.rims, self.settled[1], self.now, self.rubbed
         for one, rim, (last, _), (met, _), rubbed in zip(*columns, strict=True):
-            lost, how = one.through(before, last, self.seen, met), "went through the other side"
+            own, other = (f'"{name}"' for name in one.names)
+            lost, way = one.through(before, last, self.seen, met), f"went through the other side, {other}"
             if rim and not len(lost):
-                lost, how = rim.slid(self.seen, last.points, met.points), f'slid past the rim of "{rim.names[1]}"'
+                lost, way = rim.slid(self.seen, last.points, met.points), f"slid past the rim of {other}"
             if rubbed and not len(lost):
-                lost, how = met.points[rubbed.far > _FAR], "slid farther than a facet within a load step"
+                lost, way = met.points[rubbed.far > _FAR], f"slid on {other} farther than a facet within a load step"
             if len(lost):
-                where = f"the point that rests at {place_of(one.places(np.zeros_like(before))[lost[0]])}"
-                return Trouble("diverged", f"contact gives way ({one.names[0]}): {where} {how}")
+                rest, now = (place_of(one.places(at)[lost[0]]) for at in (np.zeros_like(before), self.seen))
+                where = f"a point of {own} that rests at {rest} and would be at {now}"
+                return Trouble("diverged", f"contact gives way: {where} {way}")
         return None
 
 

@@ -18,8 +18,8 @@ _DEGREE = 8
 # A place is on a facet up to this distance beyond its edges, in reference coordinates: on a convex surface, points between the
 # normals of two facets at their common edge are nearest to neither.
 _BEYOND = 0.02
-# A point stays on its facet up to this distance beyond the edges: where two facets meet at an angle, Newton's method would go
-# back and forth between them.
+# A point stays on its facet up to this distance beyond the edges, unless another is nearer by more than the smoothing: where two
+# facets meet at an angle, Newton's method would go back and forth between them.
 _STAYS = 0.05
 # The cosine between normals above which a point that slides off a sharp edge is free, as the part faces another way there.
 _FACING = -0.5
@@ -67,7 +67,7 @@ Settled = tuple[Floats, Met | None]
 
 class Pass:
     """The points of one ``side`` against the facets of the ``other``. ``areas`` (n,): half the rest areas [mm2] of the points;
-    ``names``: the name of the force on the side, and that of the force on the other.
+    ``names``: the names of both parts.
     """
 
     def __init__(self, law: Touching, side: Facets, other: Facets, names: tuple[str, str]) -> None:
@@ -114,15 +114,19 @@ class Pass:
         beyond, before = self.other.beyond(there.at), np.full(len(points), -1)
         if last is not None:
             before[last.points] = last.facets
-        beyond[(before[some] == facets) & (beyond <= _STAYS)] = -1.0
-        felt = np.flatnonzero((gap < most) & (gap > -self._reach(nodes)[facets]) & (beyond <= _BEYOND))
+        held = before[some] == facets
+        at_edge = beyond <= np.where(held, _STAYS, _BEYOND)
+        felt = np.flatnonzero((gap < most) & (gap > -self._reach(nodes)[facets]) & at_edge)
         here = self._here(self.side.nodes(unknowns), some[felt])
         facing = np.einsum("ni,ni->n", here.normal, there.normal[felt])
         # A point just beyond the edge of a facet that it sees from inside is outside: the facet before it is out of reach.
-        edge_on = (gap[felt] < -most) & (beyond[felt] > 0) & (facing > _FACING)
+        edge_on = (gap[felt] < -most) & (beyond[felt] > 0) & (facing > _FACING) & ~held[felt]
         faces = (facing < 0) & ~edge_on
         found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt])
-        order = np.lexsort((np.abs(found.gap), beyond[felt], found.points))
+        depth, nearest = np.abs(found.gap), np.full(len(points), np.inf)
+        np.minimum.at(nearest, found.points[faces], depth[faces])
+        beyond[felt[held[felt] & (depth <= nearest[found.points] + most)]] = -1.0
+        order = np.lexsort((depth, beyond[felt], found.points))
         order = order[faces[order]]
         return found.some(order[np.unique(found.points[order], return_index=True)[1]])
 
@@ -234,7 +238,7 @@ class Pass:
         paths = (starts, ends, free), (starts + rise, ends + rise, free & rise.any(axis=1))
         points, facets = np.concatenate([self._passed(a, b, some, old, new) for a, b, some in paths], axis=1)
         there = self.other.nearest(new, facets, ends[points])
-        front = (np.vecdot(ends[points] - there.point, there.normal) > 0) & (self.other.beyond(there.at) <= 0)
+        front = (np.vecdot(ends[points] - there.point, there.normal) > 0) & (self.other.beyond(there.at) <= _BEYOND)
         return np.union1d(behind, points[~front])
 
     def _reach(self, nodes: Floats) -> Floats:

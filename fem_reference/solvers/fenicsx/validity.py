@@ -2,7 +2,7 @@
 
 Means are used because the exact strain at the rim of an attachment is unbounded: det F at a vertex there may be far from 1 in a
 cell that has kept its volume. Even means of single cells may be far from 1 (0.37 and 1.9 in ``gluteus_maximus``, with a bulk
-modulus of a thousand shear moduli). There a law is reported as outside its range, but the body has not collapsed.
+modulus of a thousand shear moduli). In such a case a law is reported as outside its range, but the body has not collapsed.
 """
 
 from collections.abc import Callable, Iterable
@@ -23,10 +23,10 @@ from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme, le
 from fem_reference.solvers.fenicsx.forms import Form, Rule
 from fem_reference.solvers.fenicsx.meshes import geometry
 
-# A cell with less than this share of its rest volume has collapsed, whatever the laws' ranges: about four fifths of muscle are
+# A cell with less than this share of its rest volume has collapsed, for any ranges of laws: about four fifths of muscle are
 # water, which does not leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal muscle),
-# and a fifth of the volume would barely hold the rest. A body has collapsed where such cells are more than this share of it at
-# rest: at a rim they take the less, the smaller the cells are.
+# and a fifth of the volume would barely contain the solid part. A body has collapsed if such cells are more than this share of it
+# at rest; at a rim their share decreases with the size of cells.
 COLLAPSED, SHARE = 0.2, 0.01
 _SCALARS = {"V/V0": "cell_volume_ratio", "fibre stretch": "cell_fibre_stretch"}
 
@@ -80,7 +80,7 @@ class Validity:
         self.mesh, self.cells, self.effects = determinants.mesh, determinants.cells, body.effects
         self.values: dict[str, Callable[[], Floats]] = {"V/V0": determinants.values_now}
         if any(limit.measure == "fibre stretch" for effect in body.effects for limit in effect.limits()):
-            # It is compiled here, by all ranks together, even those that have no cells.
+            # The expression is compiled here, by all ranks together, even ranks without cells.
             stretch, mine = compiling.expression(form.fibre_stretch, form.rule[0]), np.arange(len(self.cells))
             self.values["fibre stretch"] = lambda: np.asarray(stretch.eval(self.mesh, mine.astype(np.int32)))
         self.volumes, self.centres = volumes_and_centres(self.mesh, len(self.cells), form.rule)
@@ -93,7 +93,7 @@ class Validity:
         return float(present / rest)
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """The trouble *collapsed* where more than a negligible part of the body has lost too much volume."""
+        """The trouble *collapsed* if more than a negligible part of the body has lost too much volume."""
         means = self._means("V/V0")
         volumes = self.volumes.sum(axis=1)
         lost, whole = self.mesh.comm.allreduce(np.array([volumes[means < COLLAPSED].sum(), volumes.sum()]), MPI.SUM)
@@ -103,8 +103,8 @@ class Validity:
         return Trouble("collapsed", why)
 
     def examine(self, frame: float) -> tuple[dict[str, float], list[Outside]]:
-        """The extremes of the means in the present state, that of ``frame``; the number of cells ``outside_law``, where a law is
-        outside its range; and each law outside it.
+        """The extremes of the means in the present state, at ``frame``; the number ``outside_law`` of cells outside the range of a
+        law; and each such law.
         """
         scalars: dict[str, float] = {}
         found: list[Outside] = []

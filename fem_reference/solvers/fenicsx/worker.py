@@ -49,7 +49,7 @@ class Worker:
         self.unstable: dict[float, tuple[float, float]] = {}  # by frame: the negative modes, and those of the material
         self.left: dict[float, float] = {}  # perturbation [mm] by frame
         self.ranges = Ranges()
-        self.exact = False  # True once linear systems are solved exactly, after Newton's method has failed
+        self.exact = False  # True once linear systems are solved exactly, after a failure of Newton's method
         self.collapse = ""  # the message of an attempt since the last good state in which the body collapsed
         self.earlier: dict[str, float] = {}  # the cost of earlier processes of this run
         self.restart = Restart(self.body, job.kept) if job.kept else None
@@ -99,8 +99,8 @@ class Worker:
         return result
 
     def solve_exactly(self) -> bool:
-        """Solve linear systems exactly from now on, as the residual of an inexact solution moves a nearly free body far away. True
-        where that is a change.
+        """Solve linear systems exactly from now on, as an inexact solution would move a nearly free body far away. True if this is
+        a change.
         """
         other = self.body.linear.solve_exactly()
         self.exact |= other
@@ -116,8 +116,8 @@ class Worker:
         )
 
     def negative_modes(self, frame: float) -> dict[str, float]:
-        """The number of directions in which the energy falls from the state of a reached frame, where it can be known; its time
-        does not count as solving.
+        """The number of directions in which the energy falls from the state of a reached frame, if known; its time does not count
+        as solving.
         """
         begin = time.perf_counter()
         modes = self.body.examine(frame)
@@ -154,7 +154,7 @@ class Worker:
         return (reached.last.status, sentence) if limit is None else ("limit point", f"{limit}; {sentence}")
 
     def report_frame(self, reached: Step) -> None:
-        """Report the state of a reached frame and keep it where the run may have to continue from it."""
+        """Report the state of a reached frame and keep it if the run may have to continue from it."""
         body, frame = self.body, reached.frame
         samples = {name: body.positions(*sample) for name, sample in self.job.samples.items()}
         forces, moments = reactions(body.system, body.contact, divided=bool(samples))
@@ -224,7 +224,7 @@ def solve(job: Job | FieldProblem, report: Sink) -> Outcome:
 
 
 def report(folder: Path, found: Frame | Outcome) -> None:
-    """Write what the first rank ``found`` into a file in the ``folder`` and report that to the process that started this one."""
+    """Write the result ``found`` by the first rank into a file in the ``folder``, and report the file to the parent process."""
     if MPI.COMM_WORLD.rank == 0:
         file = folder / f"report_{next(_numbers)}.pickle"
         file.write_bytes(pickle.dumps(found))

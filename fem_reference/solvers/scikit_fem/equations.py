@@ -19,7 +19,7 @@ QUADRATURE_DEGREE = {"P1": 2, "P2": 4, "Q1": 3, "Q2": 5}
 _AT_ONCE = 1024  # points, so that their jets fit in a cache
 
 Acting = list[tuple[Effect, float]]
-# A function of p points, their n variables and a frame: the derivatives (p, n) of the work, and those of second order (p, n, n).
+# A function of p points, their n variables and a frame: the first (p, n) and second (p, n, n) derivatives of the work.
 Law = Callable[[Points, list[Any], float], tuple[Floats, Floats]]
 
 

@@ -37,7 +37,7 @@ class ScikitFieldSettings(Record):
 @dataclass(frozen=True, eq=False)
 class Flat:
     """A mesh in the form of scikit-fem: ``mesh``, and for each cell the ``frames`` (m, d, t) and ``origins`` (m, d) that map its
-    flat coordinates (t,) to those of the domain (d,).
+    flat coordinates (t,) to coordinates of the domain (d,).
     """
 
     mesh: Any
@@ -46,7 +46,7 @@ class Flat:
 
 
 def flat(mesh: FieldMesh) -> Flat:
-    """``mesh`` laid flat cell by cell where it is a surface in space, else as it is."""
+    """``mesh``, laid flat cell by cell if it is a surface in space."""
     d = mesh.points.shape[1]
     if d < 3:
         kind = skfem.MeshLine if d == 1 else skfem.MeshTri

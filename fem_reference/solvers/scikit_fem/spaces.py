@@ -77,7 +77,7 @@ class Space:
     """The unknowns of an element of ``ELEMENTS`` on ``cells``."""
 
     def __init__(self, cells: Cells, element: str, degree: int) -> None:
-        """``degree``: that of the polynomials that are integrated exactly on a straight cell."""
+        """``degree``: the degree of polynomials that are integrated exactly on a straight cell."""
         kind, displacement, pressure = ELEMENTS[element]
         self.cells, self.degree = cells, degree
         self.nodal = _ELEMENTS[kind][displacement]()

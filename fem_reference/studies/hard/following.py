@@ -87,6 +87,7 @@ def _of_muscle(built: MechanicalProblem, frames: list[Frame]) -> Followed:
         found = [frame.scalars[name] for frame in frames if name in frame.scalars]
         return np.array(found) if len(found) == len(frames) else None
 
+    volumes = [one for span in built.spans if (one := scalar(f"{span.name}.volume_ratio")) is not None]
     determinants = [scalar("min_det_F_quadrature"), scalar("min_det_F_vertices")]
     known = [one for one in determinants if one is not None]
     return Followed(
@@ -97,7 +98,7 @@ def _of_muscle(built: MechanicalProblem, frames: list[Frame]) -> Followed:
         np.array(tets) if whole else None,
         built.bones,
         built.free,
-        integrated=scalar("volume_ratio"),
+        integrated=np.stack(volumes, axis=1) if volumes else None if built.spans else scalar("volume_ratio"),
         negative_modes=scalar("negative_modes"),
         material_modes=scalar("material_modes"),
         least_determinant=np.min(known, axis=0) if known else None,

@@ -112,7 +112,8 @@ def test_nothing_passes_a_thin_sheet_within_a_step(fem_lab, face) -> None:
     body = replace(body, prescribed=(*parts.clamped("low_x0", "low_x1"), *body.prescribed[1:]))
     outcome = solved(fem_lab, body, first_step=1.0, smallest_step=0.4).outcome
     assert outcome.status != "converged"
-    assert "went through the other side" in outcome.message
+    assert f'a point of "low_{face}" that rests at (0.3, 0.3, 0.0) mm and would be at' in outcome.message
+    assert 'went through the other side, "high_z0" beyond frame 0.00' in outcome.message
 
 
 @pytest.mark.parametrize("across", [0.0, 0.3])
@@ -125,8 +126,8 @@ def test_a_pressed_block_does_not_pass_a_thin_sheet_within_a_step(across, fem_la
     body = replace(body, prescribed=(*body.prescribed, bottom))
     outcome = solved(fem_lab, body, first_step=1.0, smallest_step=0.8).outcome
     assert outcome.status != "converged"
-    assert "(high_z0 on low_z1)" in outcome.message
-    assert "went through the other side" in outcome.message
+    assert 'a point of "low_z1" that rests at' in outcome.message
+    assert 'went through the other side, "high_z0"' in outcome.message
 
 
 @pytest.mark.parametrize(("end", "status"), [(0.5, "diverged"), (1.0, "converged")])
@@ -137,7 +138,23 @@ def test_a_pressed_point_that_slides_past_the_rim_of_a_part_is_no_silent_loss(en
     low = replace(low, facets=low.facets | {"near": flat[low.points[flat][..., 0].max(axis=1) <= end + 1e-9]})
     outcome = solved(fem_lab, pair(low, high, 0.2, 0.0, -0.005, law=replace(LAW, one="low_near"))).outcome
     assert outcome.status == status
-    assert ('slid past the rim of "low_near"' in outcome.message) == (status == "diverged")
+    said = 'a point of "high_z0" that rests at', 'slid past the rim of "low_near" beyond frame'
+    assert all((one in outcome.message) == (status == "diverged") for one in said)
+
+
+def test_points_past_a_rim_feel_the_skin_around_where_that_is_wanted(fem_lab) -> None:
+    """As above, the part ends at 0.5: beyond it the points of the upper block alone press, with half the area, and the give of
+    contact, p / k, is 1 % of the squeeze.
+    """
+    low, high = block((4, 2, 1)), placed(block((2, 1, 1), (0.4, 0.4, 0.3)), 0.05, 0.3, 0.495)
+    flat = low.facets["z1"]
+    low = replace(low, facets=low.facets | {"near": flat[low.points[flat][..., 0].max(axis=1) <= 0.5 + 1e-9]})
+    laws = replace(LAW, one="low_near", around=True), replace(LAW, one="low_z1")
+    part, whole = (solved(fem_lab, pair(low, high, 0.2, 0.0, -0.005, law=law)) for law in laws)
+    assert part.outcome.status == "converged"
+    up = part.last.forces["low_near on high_z0"]
+    assert up == pytest.approx(whole.last.forces["low_z1 on high_z0"], rel=0.05, abs=1e-4)
+    assert up + part.last.forces["high_z0 on low_near"] == pytest.approx([0, 0, 0], abs=1e-17)
 
 
 def test_a_point_that_slides_off_a_sharp_edge_is_free(fem_lab) -> None:

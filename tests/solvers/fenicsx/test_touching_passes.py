@@ -171,17 +171,39 @@ def test_a_failed_attempt_changes_no_facet_that_a_point_stays_on() -> None:
     assert np.array_equal(residual(contact), once)
 
 
-def lost(element: str, x: tuple[float, float], z: tuple[float, float], sag: float = 0.0) -> np.ndarray:
-    """True for each point of the lower face of a small block that went through in a load step, in which the middle of the face goes
-    along ``x`` and ``z``, over a block with its top at z = 0.5, of which both halves sag by ``sag``.
-    """
+def over_a_block(element: str) -> tuple[TouchingForces, np.ndarray]:
+    """A block of two by one cells with its top at z = 0.5, and a small plate at (0.5, 0.32, 1.5) with its unknowns (n, 3)."""
     kind = KINDS[element][0]
     low, high = shapes.box((2, 1, 1), (1.0, 1.0, 0.5), kind), shapes.box((1, 1, 1), (0.04, 0.04, 0.001), kind)
     high.points[:] += [0.48, 0.3, 1.5]
     mesh = shapes.joined({"low": low, "high": high})
     contact, displacement = contact_of(mesh, Touching("low_z1", "high_z0", K, 0.02), element)
+    return contact, displacement.dofs[displacement.space.tabulate_dof_coordinates()[:, 2] > 1.4]
+
+
+@pytest.mark.parametrize("element", KINDS)
+def test_a_point_stays_on_its_facet_unless_another_is_nearer_by_more_than_the_smoothing(element) -> None:
+    # The top of the block falls by 45 degrees to both sides of a ridge along x = 0.5. The plate comes 0.1 below the ridge.
+    contact, upper = over_a_block(element)
     unknowns, one = contact.unknowns.x.array, contact.passes[1]
-    upper = displacement.dofs[displacement.space.tabulate_dof_coordinates()[:, 2] > 1.4]
+    unknowns[one.other.dofs[..., 2]] = -np.abs(one.other.rest[..., 0] - 0.5)
+    for x in (0.03, -0.01):  # first below the right side alone
+        unknowns[upper] = [x, 0.0, -1.1]
+        contact.look()
+    met = contact.now[1][0]
+    right = one.places(contact.seen)[met.points, 0] - 0.5
+    # The left side is nearer by sqrt(2) times the distance to the left.
+    stays = np.sqrt(2) * -right <= 0.02
+    assert 0 < (stays & (right < 0)).sum() < (right < 0).sum()
+    assert met.gap == pytest.approx(-(0.1 - np.where(stays, right, -right)) / np.sqrt(2), abs=1e-14)
+
+
+def lost(element: str, x: tuple[float, float], z: tuple[float, float], sag: float = 0.0) -> np.ndarray:
+    """True for each point of the lower face of a plate that went through in a load step, in which the middle of the face goes
+    along ``x`` and ``z``, over a block of which both halves sag by ``sag``.
+    """
+    contact, upper = over_a_block(element)
+    unknowns, one = contact.unknowns.x.array, contact.passes[1]
     share = 2 * one.other.rest[..., 0] % 1
     unknowns[one.other.dofs[..., 2]] = -4 * sag * share * (1 - share)
     unknowns[upper] = [x[0] - 0.5, 0.0, z[0] - 1.5]
@@ -213,6 +235,24 @@ def test_a_point_between_a_curved_facet_and_its_flat_pieces_is_not_lost(element,
 def test_points_that_leave_or_slide_off_are_not_lost(element) -> None:
     assert not lost(element, (0.25, 0.8), (0.45, 0.55)).any()
     assert not lost(element, (0.9, 1.1), (0.49, 0.48)).any()
+
+
+@pytest.mark.parametrize("element", KINDS)
+def test_a_point_that_leaves_a_narrow_valley_past_its_end_is_not_lost(element) -> None:
+    """Walls z = 10 |x - 0.5|, 0.1 apart where the plate is, end at y = 0. Points of the plate are 0.02 to 0.06 deep in the left
+    wall, and come to 0.005 to 0.045 in front of the right one, by at most 0.02 beyond the end. Their path raised from the left
+    wall passes the right one.
+    """
+    contact, upper = over_a_block(element)
+    unknowns, one = contact.unknowns.x.array, contact.passes[1]
+    unknowns[one.other.dofs[..., 2]] = 10 * np.abs(one.other.rest[..., 0] - 0.5)
+    unknowns[upper] = [-0.09, 0.013 - 0.32, -0.5]
+    contact.settle()
+    before, last = np.array(unknowns), contact.now[1][0]
+    unknowns[upper] = [0.025, -0.32, -0.5]
+    contact.look()
+    assert len(last.points) > 0
+    assert not len(one.through(before, last, contact.seen, contact.now[1][0]))
 
 
 def test_a_point_outside_beside_the_edge_of_a_wall_is_not_deep_in_the_wall() -> None:
