@@ -87,7 +87,7 @@ def _render(bodies: list[tuple[Any, dict[str, Any]]], camera: dict[str, Any]) ->
     plotter = pyvista.Plotter(off_screen=True, window_size=[SIDE * _OVERSAMPLING] * 2)
     plotter.render_window.SetMultiSamples(
         1
-    )  # more samples would take four fifths of the time, and oversampling smooths edges too
+    )  # more samples take four fifths of the time; oversampling smooths edges too
     plotter.set_background("white")
     for body, looks in bodies:
         plotter.add_mesh(body, **looks)

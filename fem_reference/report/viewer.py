@@ -100,7 +100,7 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
     frames = {run.name: _frames(run, numbers) for run in shown}
     own = np.concatenate(
         [reference.surface.points[None], frames[reference.name]]
-    )  # not empty, even if no frame was reached
+    )  # not empty even if no frame was reached
     box = _box(own, list(frames.values()))
     fields = Fields(comparison, shown, numbers)
     runs, top = _runs(frames, reference.name, box)

@@ -290,10 +290,8 @@ def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats
         return barycentric, gradients
     nodes = reference_nodes("tetrahedron", 2)
     near = np.column_stack([1 - nodes.sum(axis=1), nodes]) > 0
-    i, j = (
-        near.argmax(axis=1),
-        3 - near[:, ::-1].argmax(axis=1),
-    )  # the two corners on either side of each node; for a corner, the corner twice
+    # The two corners on either side of each node; for a corner, the corner twice.
+    i, j = near.argmax(axis=1), 3 - near[:, ::-1].argmax(axis=1)
     at_corner, scale = np.where(i == j, 1.0, 0.0), np.where(i == j, 2.0, 4.0)
     one, other = barycentric[:, i], barycentric[:, j]
     slopes = scale[:, None] * (one[..., None] * gradients[:, j] + other[..., None] * gradients[:, i])
