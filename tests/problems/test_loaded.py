@@ -9,7 +9,7 @@ import shapes
 import fem_reference as fr
 from fem_reference import effects
 from fem_reference.problems.checks import check
-from fem_reference.problems.paths import Rest
+from fem_reference.problems.paths import Affine, Rest
 from fem_reference.solvers import scikit_fem
 
 RAMP = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
@@ -73,6 +73,18 @@ def test_a_load_along_the_fixed_axis_of_a_symmetry_plane_is_refused(kind) -> Non
 def test_a_pressure_on_a_slope_moves_it_along_the_axis_that_is_free() -> None:
     corners = MESH.points + 0.1 * MESH.points[:, :1] * [0, 0, 1]
     check(replace(body(replace(FIXED, components=(2,))), mesh=replace(MESH, points=corners)), "P1")
+
+
+def test_a_pressure_on_a_face_that_its_path_tilts_acts_along_the_others() -> None:
+    lifted, tilted = (
+        fr.Prescribed("lid", "z1", (2,), Affine(gradient, (0.0, 0.0, 0.1)))
+        for gradient in (((0.0, 0.0, 0.0),) * 3, ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)))
+    )
+    side = fr.Prescribed("side", "x0", (0, 2), lifted.path)  # shares an edge, and its displacements, with the lid
+    for one in ((lifted,), (lifted, side)):
+        with pytest.raises(fr.InputError, match="prescribed exactly"):
+            check(body(*one, on="z1"), "P1")
+    check(body(tilted, on="z1"), "P1")
 
 
 def test_a_membrane_on_a_prescribed_face_is_stretched_by_its_path() -> None:
