@@ -86,7 +86,7 @@ def on_facets(displacement: Displacement, mesh: Cells, facets: Ints, degree: int
 
 
 def on_skin(displacement: Displacement, skin: Skin, local: Ints) -> ContactPoints:
-    """The points of a ``skin`` in this rank's own cells; ``local`` (m,): the number here of each cell of the body, else -1."""
+    """The points of a ``skin`` in this rank's own cells; ``local`` (m,): this rank's number of each cell of the body, or -1."""
     mine, msh = np.flatnonzero(local[skin.cells] >= 0), displacement.space.mesh
     cells, points = local[skin.cells[mine]], skin.points[mine]
     within = barycentric(points, msh.geometry.x[msh.geometry.dofmap[cells]])[:, 1:]
