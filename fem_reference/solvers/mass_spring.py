@@ -53,7 +53,7 @@ class MassSpringSettings(Record):
     small mass would make every time step small. ``frame_time``: the solver's time between successive frame numbers; the longer it
     is, the nearer the muscle is to equilibrium. The scene's interval applies to the reference and to recorded sequences.
     ``damping``: the coefficient c, or ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an acceleration, by default
-    none. ``collision``: contact with bones at every step, by default none. ``time_step``: the longest step, by default a stable one.
+    none. ``collision``: contact with bones at every step, by default none. ``time_step``: the longest, by default a stable one.
     """
 
     stiffness: Stiffness
