@@ -35,9 +35,7 @@ class ContactPoints:
         return np.asarray(self.rest + carried.shares @ unknowns[carried.dofs])
 
     def add_forces(self, residual: Floats, forces: Floats, some: Ints | None = None) -> None:
-        """Add the weak form of ``forces`` (n, 3) [N] at the points, or at ``some`` of them (n,), to ``residual`` over this rank's
-        unknowns.
-        """
+        """Add the weak form of ``forces`` (n, 3) [N] at (``some`` of) the points to ``residual`` over this rank's unknowns."""
         shares = self.carried.shares if some is None else self.carried.shares[some]
         residual[self.carried.dofs] += shares.T @ forces  # ``dofs`` names each unknown once
 
