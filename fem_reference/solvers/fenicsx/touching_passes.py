@@ -176,7 +176,7 @@ class Pass:
         return np.vecdot(points[some] - middle.point[facets], middle.normal[facets]), bulge
 
     def pressure(self, met: Met) -> tuple[Floats, Floats]:
-        """Pressure (n,) [MPa] of points that ``met`` the other side, less that of overlaps left at rest, and its slope in the gap."""
+        """Pressure (n,) [MPa] of points that ``met`` the other side, less that of overlaps at rest, and its slope in the gap."""
         return self.law.pressure(met.gap + self.share * self.overlaps[met.points])
 
     def let_fall(self, met: Met) -> None:
