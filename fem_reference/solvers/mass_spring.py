@@ -164,8 +164,7 @@ class MassSpringModel:
     def frame(self, number: int) -> Frame:
         """Surface and fibres as the masses carry them; attached vertices move with their bones.
 
-        Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and ``inverted_tets``, the number of inverted
-        tetrahedra.
+        Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and the number ``inverted_tets``.
         """
         given, mesh = self.problem, self.problem.mesh
         moved = self.points - mesh.points
