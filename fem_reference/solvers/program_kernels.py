@@ -2,8 +2,7 @@
 
 All of it follows the program's source. As the result is chaotic, the last digit counts: each sum has the order that gcc 12 produces
 with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than SSE2), as
-found in the machine code. Do not simplify the sums. Arrays should be writable and C-contiguous: any other kind is compiled
-separately.
+found in the machine code. Do not simplify the sums. Arrays that are not writable and C-contiguous are compiled separately.
 """
 
 import math
