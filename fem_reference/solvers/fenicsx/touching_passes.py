@@ -66,9 +66,7 @@ Settled = tuple[Floats, Met | None]
 
 
 class Pass:
-    """The points of one ``side`` against the facets of the ``other``. ``areas`` (n,): half the rest areas [mm2] of the points;
-    ``names``: the names of both parts.
-    """
+    """Points of one ``side`` against facets of the ``other``; ``areas`` (n,): half their rest areas [mm2]; ``names``: of both."""
 
     def __init__(self, law: Touching, side: Facets, other: Facets, names: tuple[str, str]) -> None:
         self.law, self.side, self.other, self.names = law, side, other, names
