@@ -29,7 +29,7 @@ type CheckProblem[S: Record] = Callable[[S, Any, str], None]
 
 
 class TableRow(NamedTuple):
-    """A row of the page table-5-1: a solver's ``name`` in a ``kind`` of Table 5.1; ``settings``, as in scene files, for every scene."""
+    """A row of the page table-5-1: a solver's ``name`` in a ``kind``; ``settings``, as in scene files, for every scene."""
 
     kind: str
     name: str
