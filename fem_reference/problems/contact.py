@@ -44,8 +44,7 @@ class ContactLaw:
     the second on it counts in full.
 
     ``in_situ`` [mm], for a body under tension at rest: points that overlap a bone, or whose gap is within this distance, touch the
-    bone at rest, with the pressure that balances the tension (``effects.in_situ``). Later only the change of the gap of such a
-    point counts.
+    bone at rest, with the pressure that balances the tension (``effects.in_situ``). Later only changes of their gaps count.
 
     ``friction``: the coefficient of Coulomb's law, None without friction. A point sticks to the bone by a spring of the stiffness
     k, and slides at a traction of ``friction`` times the pressure.

@@ -46,9 +46,8 @@ def iterate(krylov: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, mos
 
 
 class Factorised:
-    """Solves with the present ``matrix``. If ``lagged``, by FGMRES preconditioned with an older factorisation, which is replaced
-    once its iterations, for one system or all since, took longer than a new factorisation. The factors are LDL^T for a symmetric
-    matrix, else LU.
+    """Solves with the present ``matrix``; if ``lagged``, by FGMRES preconditioned with an older factorisation, which is replaced
+    once its iterations, for one system or all since, took longer than a new factorisation. Factors are LDL^T if symmetric, else LU.
     """
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, lagged: bool, precision: str, spent: Spent) -> None:
