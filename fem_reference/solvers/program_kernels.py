@@ -8,13 +8,10 @@ found in the machine code. Do not simplify the sums. Arrays that are not writabl
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Bools, Floats, Ints
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import Vector, at, cross, dot, minus, move, times
-
-Bools = NDArray[np.bool_]
 
 # Pairs of triangles whose normals have a cosine of greater magnitude than this are left as they are.
 FLAT_COSINE = 1 - 1e-10
