@@ -15,8 +15,7 @@ from fem_reference.geometry.skins import Skin
 
 # The largest share of the unattached surface that may be exempt from contact; above half of this share there is a warning.
 _LOST = 0.5
-# The least half thickness of a bone, in spacings of contact points: a thinner bone would pass between four points at a distance of
-# 0.71 from each.
+# The least half thickness of a bone, in spacings of contact points: a thinner bone passes between four points, each 0.71 away.
 _THINNEST = 0.75
 # Above this share of half a bone's thickness, the direction in which to remove an overlap at rest is not defined.
 _MIDDLE = 0.95
