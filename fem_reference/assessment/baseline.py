@@ -32,8 +32,7 @@ POSITION_PLACES = 2
 POSITION_ROUNDING = math.sqrt(3) * 0.5 * 10**-POSITION_PLACES
 # The number of sampled vertices, which take about 1.3 kB per frame. Motion of other vertices is visible only in the statistics.
 SAMPLED = 64
-# The tolerance of positions [mm] in a new baseline: far below visible differences. A solver whose results differ more between
-# machines needs a greater tolerance.
+# The tolerance of positions [mm] in a new baseline, far below visible differences; too small if machines differ more.
 MOVED = 0.1
 # The tolerance of a statistic is at most this share of its greatest value over the frames.
 SHARE = 0.02

@@ -37,10 +37,9 @@ _LEAST_POINTS, _LEAST_SPAN = 2, 1.3
 
 @dataclass(frozen=True)
 class Point:
-    """A ``solver`` with settings, run on a ``case``: the varied key (``knob``, "" for the settings of the case or the default)
-    and its ``value`` as text; ``choice``: everything needed to repeat it; its outcome. ``errors``: by ``metric.statistic``, the
-    greatest magnitude over the frames of the deviation from the truth; ``costs``: the known ones of ``COSTS`` by name, and seconds
-    by phase.
+    """A ``solver`` with settings, run on a ``case``: the varied key (``knob``, "" for the settings of the case or the default) and
+    its ``value`` as text; ``choice``: everything needed to repeat it; its outcome. ``errors``: by ``metric.statistic``, the
+    greatest deviation from the truth over the frames; ``costs``: the known ones of ``COSTS`` by name, and seconds by phase.
     """
 
     case: str

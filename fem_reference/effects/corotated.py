@@ -4,8 +4,7 @@ from typing import Any
 
 from fem_reference.effects import LameLaw, State
 
-# Newton steps for the sum of the stretches: the relative error is 4e-11 for stretches from 0.3 to 3, and greater in inverted
-# states.
+# Newton steps for the sum of the stretches: relative error 4e-11 for stretches from 0.3 to 3, greater in inverted states.
 _STEPS = 4
 
 

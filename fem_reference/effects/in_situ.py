@@ -14,10 +14,9 @@ class InSitu(Prestrain):
 
     The energy of this stress per rest volume is ``2 mu dev(e) : E + p0 (J - 1)``, ``E = (F^T F - 1) / 2``, with fixed fields ``e``
     and ``p0``, so the stress rotates with the body. ``e`` and ``p0`` are the strain and pressure of an isotropic body under the
-    forces at rest, with the shear and bulk modulus at rest of the scene's effects. Of all stresses that balance these forces, this
-    stress has the least energy. The isotropic body is supported by the springs of attachments, which are extended at rest, and by
-    the bones. Bones press wherever the muscle touches them or is within ``support`` of them (``contact``), through the tissue in
-    between.
+    forces at rest, with the shear and bulk modulus at rest of the scene's effects. This stress has the least energy of all that
+    balance these forces. The isotropic body is supported by the springs of attachments, which are extended at rest, and by the
+    bones. Bones press where the muscle touches them or is within ``support`` of them (``contact``), through the tissue in between.
 
     ``stretch``: without unit, above 1 if fibres are taut at rest; 1 if only an activation acts at rest.
     Source: Maas, Erdemir, Halloran and Weiss 2016, doi 10.1016/j.jmbbm.2016.04.012, who find a prestrain in equilibrium with this

@@ -29,8 +29,7 @@ SCALED: dict[type[Effect], tuple[str, ...]] = {
     FibrePassive: ("stress",),
     FibrePassiveFebio: ("c3", "c5"),
 }
-# Parameters in a part differ by at most this factor; fibre parameters below this share of the greatest count as equal to this
-# share.
+# Parameters in a part differ by at most this factor; fibre parameters below this share of the greatest count as that share.
 FACTOR, _LEAST = 1.2, 0.01
 # The parameters of fibres, which end at the border of a region.
 _OF_FIBRES = ("stress", "c3", "c5")

@@ -25,8 +25,7 @@ class Indicator:
 @dataclass(frozen=True)
 class Near:
     """Nearness of the free surface to a bone. ``gap`` [mm]: the clearance, guaranteed for any error of the guessed surface motion.
-    ``depth`` [mm]: the possible penetration, root mean square over the surface at the worst frame. ``frame``: the first frame with
-    the smallest gap.
+    ``depth`` [mm]: the possible penetration of the surface, rms at the worst frame. ``frame``: the first with the least gap.
     """
 
     gap: float

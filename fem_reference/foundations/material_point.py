@@ -45,10 +45,9 @@ class State:
 
     ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``; ``displacement``: (3,) [mm]; ``pressure``: the mixed pressure
     unknown [MPa], None if no effect adds it; ``fibre``: the unit vector (3,) along the fibres at rest, None without fibres;
-    ``amount``: the factor of the effect (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] at the start of the
-    load step; ``F_before``: its deformation gradient; ``predicted``: the displacement (3,) [mm] at constant velocity; ``rate``: 1
-    over the duration of the step [1/s], 0 in a quasi-static step; ``regions``: the share of the point, from 0 to 1, in each region
-    of the body.
+    ``amount``: the factor of the effect (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] before the load step;
+    ``F_before``: its deformation gradient; ``predicted``: the displacement (3,) [mm] at constant velocity; ``rate``: 1 over the
+    duration of the step [1/s], 0 in a quasi-static step; ``regions``: the share of the point, from 0 to 1, in each region.
     """
 
     F: Sequence[Sequence[Any]]

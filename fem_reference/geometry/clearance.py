@@ -32,8 +32,7 @@ class Clearance:
         nodes = np.rint(within).astype(np.int64)
         found = self.away[tuple(nodes.T)] - self.spacing * np.linalg.norm(within - nodes, axis=1)
         beyond = self.spacing * np.linalg.norm(at - within, axis=1)
-        # The grid is convex: from a point outside, the path beyond its nearest grid point makes no acute angle with the
-        # path to it.
+        # The grid is convex: from a point outside, the path beyond its nearest grid point makes no acute angle with the path to it.
         found = np.where(beyond > 0, np.hypot(beyond, np.maximum(found, 0)), found)
         return np.where(known, found, np.nan)
 

@@ -13,8 +13,7 @@ _ROUNDS = 6
 # A vertex may move along a direction if the squares of the normals around the vertex have less than this share in this direction:
 # the vertex then stays on its plane or sharp edge. Above 0.05 a thin rim shrinks, below 0.02 slivers remain.
 _FREE = 0.03
-# Distance of the pole of inversion in diagonals of the body. A nearer pole moves sharp edges, a farther pole leaves flat parts
-# flat.
+# Distance of the pole of inversion in diagonals of the body. A nearer pole moves sharp edges, a farther one leaves flat parts flat.
 _POLE = 6.0
 _NEARLY_FLAT = np.cos(np.radians(30))
 _TINY = np.finfo(float).tiny

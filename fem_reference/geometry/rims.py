@@ -23,8 +23,7 @@ from fem_reference.geometry.sectors import attached_area, sectors, shares_at
 
 # Chosen by trials on the report's muscles and our own hip. Smoothing length of the shares in triangle sizes; more rounds corners.
 _SMOOTHED = 0.1
-# A vertex closer to a crossing than this share of the edge moves to the crossing. Above 0.35 triangles degenerate, below 0.25
-# slivers remain.
+# A vertex closer to a crossing than this share of the edge moves to it. Above 0.35 triangles degenerate, below 0.25 slivers remain.
 _NEAR = 0.3
 # A fixed vertex closer to a crossing than this share of the edge counts as on the rim.
 _THERE = 0.2

@@ -1,6 +1,5 @@
 """Energy that a muscle stores, by all its effects, springs and contact: minus its slope in the angle is the moment about a joint.
-Only some solvers compute this energy. Without dissipation its change is the work of the bones; at rest it is the energy of initial
-stresses.
+Only some solvers compute energy. Without dissipation its change is the work of the bones; at rest it is that of initial stresses.
 """
 
 from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures

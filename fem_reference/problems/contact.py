@@ -15,8 +15,7 @@ from fem_reference.geometry.skins import Skin
 
 # The largest share of the unattached surface that may be exempt from contact; above half of this share there is a warning.
 _LOST = 0.5
-# The least half thickness of a bone, in spacings of contact points: a thinner bone would pass between four points at a distance of
-# 0.71 from each.
+# The least half thickness of a bone, in spacings of contact points: a thinner bone passes between four points, each 0.71 away.
 _THINNEST = 0.75
 # Above this share of half a bone's thickness, the direction in which to remove an overlap at rest is not defined.
 _MIDDLE = 0.95
@@ -44,8 +43,7 @@ class ContactLaw:
     the second on it counts in full.
 
     ``in_situ`` [mm], for a body under tension at rest: points that overlap a bone, or whose gap is within this distance, touch the
-    bone at rest, with the pressure that balances the tension (``effects.in_situ``). Later only the change of the gap of such a
-    point counts.
+    bone at rest, with the pressure that balances the tension (``effects.in_situ``). Later only changes of their gaps count.
 
     ``friction``: the coefficient of Coulomb's law, None without friction. A point sticks to the bone by a spring of the stiffness
     k, and slides at a traction of ``friction`` times the pressure.

@@ -21,8 +21,7 @@ from fem_reference.scenes.muscle import MuscleCase
 # the surface if that is less. Error bars of the surface (rms) are 0.03 to 0.14 of the size and 0.01 to 0.05 of the travel; bars of
 # fibre lengths and volumes are smaller if only these change.
 TOLERANCE = 0.005
-# The negligible change of stress by an effect, relative to the stress of the other effects, and the least strain assumed for that
-# stress.
+# The negligible change of stress by an effect, relative to the stress of the others, and the least strain assumed for it.
 STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
 # The error of the guessed position of a point, as a share of its path past a bone (0.83 in `hip_flexion`).
 _DOUBT = 1.0

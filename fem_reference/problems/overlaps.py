@@ -1,6 +1,4 @@
-"""Parts of the surface of a body that may touch: their overlap at the start, which the search for contact finds only if it is
-shallow, and the skin beyond their rims.
-"""
+"""Surface parts that may touch: their overlap at the start, found by contact search only if shallow, and the skin beyond rims."""
 
 from functools import lru_cache
 

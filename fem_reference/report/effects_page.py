@@ -17,8 +17,7 @@ from fem_reference.report.words import duration, listed, number, words
 MAIN = "surface_deviation.rms"
 # The heading of each column of the table, by name.
 HEADS = {".".join(key): one.label.lower() for key, one in described("main").items()}
-# The axis ends at this factor below the least change that counts; smaller changes are drawn at the end of the axis, with their
-# value.
+# The axis ends at this factor below the least change that counts; smaller changes are drawn at its end, with their value.
 _DEPTH = 10.0
 
 

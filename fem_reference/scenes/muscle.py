@@ -152,9 +152,8 @@ class CaseJoint(Record):
 
 
 class Muscle(Record):
-    """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often the tetrahedra are cut
-    into eight. ``mesher``: ``"quality"`` for good tetrahedra, or ``"block"`` for a box along the axes: a grid of boxes, each cut
-    into six.
+    """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often they are cut into eight.
+    ``mesher``: ``"quality"`` for good tetrahedra, or ``"block"`` for a box along the axes: a grid of boxes, each cut into six.
     """
 
     surface: str
@@ -199,8 +198,7 @@ class Landmarks(Record):
 class Attachment(Record):
     """The part of the muscle surface that is attached to a bone, given by exactly one of ``vertices``, ``within`` (a distance from
     the bone) and ``outline``. Springs of a ``stiffness`` attach its area; without a stiffness it moves exactly with the bone.
-    Fibres that end beside it continue as a straight ``tendon`` to a point of the bone; the tendon pulls only with the effect
-    ``tendon``.
+    Fibres that end beside it continue as a straight ``tendon`` to a point of the bone; it pulls only with the effect ``tendon``.
     """
 
     name: Name

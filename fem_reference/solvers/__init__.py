@@ -65,9 +65,7 @@ def in_table(kind: str | None = None) -> tuple[Candidate, ...]:
 
 
 def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
-    """The name of a run and the settings for ``name``, a solver or a candidate: from the case's candidate, else from the page
-    table-5-1, else the solver's defaults.
-    """
+    """A run's name and settings for ``name``, a solver or candidate: from the case, else the page table-5-1, else the defaults."""
     own = [one for one in case.candidate if one.solver == name] + [one for one in case.candidate if one.name == name]
     table = [one for one in in_table() if one.solver == name and case.task == "solve"]
     for one in (*own, *table):

@@ -82,7 +82,7 @@ class GlobalStep:
 
     ``pick`` (m, n) multiplies both sides: it selects the rows of free vertices or, for least squares, is the transpose of their
     columns. ``coupling`` (m, k): the columns of attached vertices, also multiplied. ``loose``: free vertices that no weights
-    connect to an attached vertex. If any are, or nothing or everything is attached, there is no ``factor``: free vertices stay.
+    connect to an attached vertex. If there are any, or nothing or all is attached, there is no ``factor``: free vertices stay.
     """
 
     cells: VertexCells
@@ -198,8 +198,7 @@ def alternate[S: Record](make: Callable[[Setup, S], Alternation], setup: Setup, 
 
 def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:
     """``points`` (n, 3) with the ``free`` points scaled about the mean of all by the cube root of V0 / V, eq. 5.9. V0 is ``volume``
-    [mm3], which is reached only if all vertices are free, as attached vertices stay in place. A surface that encloses no volume is
-    not changed.
+    [mm3], reached only if all vertices are free, as attached vertices stay in place. A surface without volume is not changed.
     """
     centre, inside = points.mean(axis=0), abs(enclosed_volume(points, triangles))
     factor = np.cbrt(volume / inside) if inside > 0 else 1.0

@@ -63,11 +63,9 @@ def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: floa
 
 
 def project_bend(turns: Floats, stiffness: float) -> None:
-    """Project ``C = Im(conjugate(u_a) u_b)`` of neighbouring segments, and of outer segments and bones: they bend and twist as
-    little as possible.
+    """Project ``C = Im(conjugate(u_a) u_b)`` of neighbouring segments, and of outer segments and bones: they bend and twist least.
 
-    The Darboux vector of Kugelstadt and Schoemer (2016), with frames at rest taken as parallel: a rod that is curved at rest
-    remains curved.
+    The Darboux vector of Kugelstadt and Schoemer (2016), with frames at rest taken as parallel: rods curved at rest remain so.
     """
     a, b, found = turns[:, :-1], turns[:, 1:], np.zeros_like(turns)
     step = pure(-stiffness / 4 * product(conjugate(a), b)[..., 1:])

@@ -47,9 +47,8 @@ class XpbdSettings(Record):
     sequences. ``sub_steps``: time steps in a ``frame_time``. ``sweeps``: over all constraints in each time step. ``density``
     [t/mm3]: of the enclosed body; its mass is divided among the vertices in proportion to area.
 
-    ``stretch`` [N/mm]: Young's modulus times thickness of the membrane. ``bending`` [N mm]: the stiffness of a plate. ``volume``
-    [MPa]: bulk modulus of the enclosed body. ``damping`` [1/s]: rate at which velocities decay without forces. ``collision``:
-    contact with bones.
+    ``stretch`` [N/mm]: the membrane's Young's modulus times thickness. ``bending`` [N mm]: the stiffness of a plate. ``volume``
+    [MPa]: bulk modulus of the enclosed body. ``damping`` [1/s]: rate of decay of velocities. ``collision``: contact with bones.
     """
 
     frame_time: units.Time

@@ -63,9 +63,7 @@ def _quarter(n: int) -> Cells:
 
 
 def pressed(lab: Lab, n: int, radius: float) -> Frame:
-    """A quarter of a flat body below z = 0, and of one above, with a bump of a ``radius`` [mm] where they touch; their far ends
-    approach each other by APPROACH.
-    """
+    """A quarter of a flat body below z = 0 and of one above with a bump of ``radius`` [mm]; their far ends approach by APPROACH."""
     low, high = _quarter(n), _quarter(n + 1)
     away = np.hypot(high.points[:, 0], high.points[:, 1])
     beyond = FLAT**2 / (2 * radius) + FLAT**2 / radius * np.tanh((away - FLAT) / FLAT)  # far from the contact

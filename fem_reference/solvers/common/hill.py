@@ -22,8 +22,7 @@ from fem_reference.foundations.units import Angle, Force, PositiveLength
 # Thelen 2003, young adults: width of the active curve; shape of the passive curve and its strain at F0; the strain of the tendon at
 # F0; the greatest force in lengthening.
 _WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN, _LENGTHENING = 0.45, 5.0, 0.6, 0.04, 1.4
-# The tendon's toe ends at this share of F0, with this shape; beyond its end strain the curve is a line of the same slope (same
-# source).
+# The tendon's toe ends at this share of F0, with this shape; beyond its end strain the curve is a line of the same slope (Thelen).
 _TOE, _TOE_SHAPE = 0.33, 3.0
 _TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # times the strain
 _TOE_STRAIN = _TENDON_STRAIN * _TOE_SLOPE / (_TOE_SLOPE + 1 - _TOE)

@@ -29,9 +29,7 @@ type CheckProblem[S: Record] = Callable[[S, Any, str], None]
 
 
 class TableRow(NamedTuple):
-    """A row of the page table-5-1: a solver, as ``name`` within a ``kind`` of the report's Table 5.1, with the same ``settings``
-    on every scene, as scene files write them.
-    """
+    """A row of the page table-5-1: a solver's ``name`` in a ``kind``; ``settings``, as in scene files, for every scene."""
 
     kind: str
     name: str

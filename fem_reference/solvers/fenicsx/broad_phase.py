@@ -12,7 +12,7 @@ from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 
 
 class Patches:
-    """The points of each of p cells. A point moves at most ``spread`` (p,) times as far as the k nodes of its cell, the sum of the
+    """The points of each of p cells. A point moves at most ``spread`` (p,) times as far as the k nodes of its cell: the sum of the
     magnitudes of their basis functions there. If these do not give the rest position, a rotation adds at most ``off`` (p,) [mm].
     """
 

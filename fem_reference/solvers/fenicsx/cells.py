@@ -165,9 +165,7 @@ class CellSums:
         return self.kept[4].reshape(-1, self.unknowns.shape[1] - 3 * self.nodes)
 
     def _parts(self) -> Iterator[tuple[slice, Floats, Floats]]:
-        """One chunk of cells at a time: the first and second derivatives of the present energy at their points (m, q, v), and the
-        volumes (m, q) [mm3] of the points.
-        """
+        """First and second derivatives of the energy at points (m, q, v) and their volumes (m, q) [mm3], by chunks of cells."""
         for some in self._chunks():
             cells = np.arange(some.start, some.stop, dtype=np.int32)
             slopes = np.einsum("mgi,qgr->mqir", self.corners[some], self.kept[1])

@@ -32,9 +32,7 @@ OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's compilation, run by one process at a time. A lock for each form would take longer: its signature needs more time than
-    the search for a compiled form.
-    """
+    """FFCx's compilation, by one process at a time. A lock per form takes longer: a signature costs more than finding a form."""
 
     @wraps(compiled)
     def waiting(objects: list[Any], *given: Any, **options: Any) -> R:

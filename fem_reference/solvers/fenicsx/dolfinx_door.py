@@ -19,8 +19,7 @@ try:
     import dolfinx
     from petsc4py import PETSc
 
-    # If numba is loaded, this import would make the wheel's libraries global, and h5py would use the wheel's HDF5 instead of its
-    # own.
+    # If numba is loaded, this import makes the wheel's libraries global, and h5py would use the wheel's HDF5, not its own.
     if _HIDDEN:
         import dolfinx.fem.petsc
 finally:

@@ -175,9 +175,7 @@ class Form:
 
 @dataclass(frozen=True, eq=False)
 class TimeStep:
-    """A load step with a duration: its inverse ``rate`` [1/s], the unknowns ``before`` it, and with inertia the ``predicted``
-    ones and the ``velocity``.
-    """
+    """A load step's inverse duration ``rate`` [1/s], unknowns ``before``, and with inertia ``predicted`` ones and ``velocity``."""
 
     rate: fem.Constant
     before: fem.Function

@@ -14,8 +14,7 @@ _FLOPS, _ENTRIES = 3, 29  # indices of RINFOG, the operations of a factorisation
 # Above this number of unknowns the factors are compressed by blocks (BLR: ICNTL(35)), up to an error of 1e-5 (CNTL(7)). Compression
 # halves the time of a factorisation at 170 000 unknowns and gains nothing at 16 000.
 _COMPRESSED_FROM, _COMPRESSION, _DROPPED = 80_000, 35, 7
-# Per entry of the factors, a back-substitution takes as long as this number of operations of a factorisation, as measured on meshes
-# of 16 000 and of 200 000 unknowns.
+# A back-substitution per entry of the factors, in operations of a factorisation, measured at 16 000 and 200 000 unknowns.
 _OPERATIONS = 22.0
 _LEAST, _MOST = 12, 80  # bounds of the number of Krylov iterations for which an old factorisation is kept
 _INVERSE_ITERATIONS, _RESOLVED = 4, 0.1  # for the test of single precision
@@ -46,9 +45,8 @@ def iterate(krylov: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, mos
 
 
 class Factorised:
-    """Solves with the present ``matrix``. If ``lagged``, by FGMRES preconditioned with an older factorisation, which is replaced
-    once its iterations, for one system or all since, took longer than a new factorisation. The factors are LDL^T for a symmetric
-    matrix, else LU.
+    """Solves with the present ``matrix``; if ``lagged``, by FGMRES preconditioned with an older factorisation, which is replaced
+    once its iterations, for one system or all since, took longer than a new factorisation. Factors are LDL^T if symmetric, else LU.
     """
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, lagged: bool, precision: str, spent: Spent) -> None:

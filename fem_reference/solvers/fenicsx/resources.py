@@ -68,9 +68,7 @@ def available() -> float:
 
 
 def planned[S: BodySettings](settings: S, cells: Cells, free: float) -> S:
-    """The settings with a linear solver and its precision: as requested, or as the size suggests and the ``free`` megabytes allow.
-    InputError if nothing fits.
-    """
+    """Settings with linear solver and precision: as requested, or as size and ``free`` megabytes allow; InputError if none fits."""
     count = unknowns(cells, settings.element)
     for kind in [settings.linear_solver] if settings.linear_solver else _fitting(settings.element, count):
         precision = settings.precision or ("double" if kind == "direct" else "single")

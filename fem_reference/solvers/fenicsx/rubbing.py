@@ -101,9 +101,7 @@ class Rubbing:
         self.facets[met.points], self.at[met.points], self.settled = met.facets, held, np.array(unknowns)
 
     def rubbed(self, met: Met, unknowns: Floats) -> Rubbed:
-        """The friction of the points that ``met`` facets: ``-min(k |e|, friction p) e / |e|``, with the elastic slip e and its
-        length in the present metric.
-        """
+        """Friction of points that ``met`` facets: ``-min(k |e|, friction p) e / |e|``, e the elastic slip in the present metric."""
         tables = self.other.element.tabulate(3, met.there.at)[..., 0]
         place, whole, elastic, change = self._slipped(met, unknowns, tables)
         covector = np.einsum("nab,nb->na", place.metric, elastic)

@@ -12,8 +12,7 @@ from fem_reference.problems.touching import Touching
 from fem_reference.solvers.fenicsx.facets import FacetPlaces, Facets
 from fem_reference.solvers.fenicsx.own_pairs import OwnPairs
 
-# The degree of quadrature on facets: with 5 instead of 8, the pressure between two blocks with unrelated meshes is off by 5 instead
-# of 2 %.
+# The degree of quadrature on facets; with 5, the pressure between two blocks with unrelated meshes is off by 5 instead of 2 %.
 _DEGREE = 8
 # A place is on a facet up to this distance beyond its edges, in reference coordinates: on a convex surface, points between the
 # normals of two facets at their common edge are nearest to neither.
@@ -66,9 +65,7 @@ Settled = tuple[Floats, Met | None]
 
 
 class Pass:
-    """The points of one ``side`` against the facets of the ``other``. ``areas`` (n,): half the rest areas [mm2] of the points;
-    ``names``: the names of both parts.
-    """
+    """Points of one ``side`` against facets of the ``other``; ``areas`` (n,): half their rest areas [mm2]; ``names``: of both."""
 
     def __init__(self, law: Touching, side: Facets, other: Facets, names: tuple[str, str]) -> None:
         self.law, self.side, self.other, self.names = law, side, other, names

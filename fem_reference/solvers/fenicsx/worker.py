@@ -114,7 +114,7 @@ class Worker:
         )
 
     def negative_modes(self, frame: float) -> dict[str, float]:
-        """The number of directions in which the energy falls from a reached frame, if known; not counted as time of solving."""
+        """The number of directions in which the energy falls from a reached frame, if known; its time does not count as solving."""
         begin = time.perf_counter()
         modes = self.body.examine(frame)
         own = self.body.modes_of_material() if modes is not None and modes > 0 else modes

@@ -40,8 +40,7 @@ class Lattice(Record):
 
     ``grading``: along each axis, the last cell over the first. ``jitter``: the greatest random displacement of nodes inside the
     block and its faces, in cells, by a ``seed``. ``rounding``: the share of an ellipsoid in its shape. ``fibre``: the direction of
-    fibres and of the measured lines. ``points_apart`` [mm]: the spacing of points on which bones press and springs pull, by default
-    as on muscles.
+    fibres and of the measured lines. ``points_apart`` [mm]: the spacing of points of contact and springs, by default as on muscles.
     """
 
     size: Point
