@@ -226,7 +226,9 @@ def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
 
 
 def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) -> tuple[Bench[C], Run]:
-    """The bench of a changed scene, and the reference's run of it over the frames of ``reference``."""
+    """The bench of a changed scene, and the reference's run of it over the frames of ``reference``. Frames that it did not reach,
+    and all frames if the second check denies it, are NaN, so that they have no bar.
+    """
     other = Bench(case, bench.store, bench.ranks)
     try:
         run = other.obtain(f"reference, {name}", without_states(case.reference), "reference")
@@ -235,7 +237,7 @@ def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) 
         raise InputError(f"error bar, {name}", got, "a finer reference") from error
     if run.outcome.status != "converged":
         log.info("error bar: %s: %s, %s", name, run.outcome.status, run.outcome.message)
-    return other, complete(run, reference.numbers)
+    return other, complete(run, reference.numbers, trusted=run.outcome.status != "denied")
 
 
 def _of(reference: Run) -> dict[str, str]:

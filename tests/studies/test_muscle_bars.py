@@ -126,6 +126,16 @@ def test_each_muscle_has_bars_of_its_own_pair_with_all_meshes_coarser(two, monke
             error_bars(case, reference, muscle=name, store=store)
 
 
+def test_further_runs_that_the_second_check_denies_give_no_bar(two, monkeypatch) -> None:
+    stand_ins.deny_further_runs(monkeypatch)
+    bench = Bench(casefile.read(two), two / "runs")
+    reference = bench.reference()
+    assert reference.outcome.status == "converged"
+    for found in muscle_bars.obtain(bench, reference).values():
+        assert found.bars
+        assert all(np.isnan(bar.values).all() for bar in found.bars)
+
+
 @pytest.mark.parametrize(("own", "wanted", "ratio"), [((0, 1), (0, 1), 1.5), ((1, 2), (0, 1), 2.0)])
 def test_all_muscles_are_coarser_by_the_same_ratio(two, own, wanted, ratio) -> None:
     changes = {f"muscle[{i}].refinements": count for i, count in enumerate(own)}

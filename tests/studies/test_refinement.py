@@ -180,6 +180,13 @@ def test_a_coarser_run_that_fails_leaves_frames_without_a_bar(case, monkeypatch)
     assert (facts["verdict"], facts["verdicts"][0]["error_bar"]) == ("inconclusive", None)
 
 
+def test_further_runs_that_the_second_check_denies_give_no_bar(case, monkeypatch) -> None:
+    stand_ins.deny_further_runs(monkeypatch)
+    _, facts = call(case, "run", "--error-bar")
+    assert {row["value"] for row in facts["error_bars"] if row["frame"] > 0} == {None}
+    assert (facts["verdict"], facts["verdicts"][0]["error_bar"]) == ("inconclusive", None)
+
+
 @pytest.mark.parametrize("changes", [{}, {"attachment[0].stiffness": "100 kPa/mm"}])
 def test_bars_know_whether_an_attachment_is_by_springs(case, monkeypatch, changes) -> None:
     pairs, make = [], error_bars.error_bars
