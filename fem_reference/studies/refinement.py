@@ -23,6 +23,7 @@ from fem_reference.io import files
 from fem_reference.metrics import context_of
 from fem_reference.problems.body import Body
 from fem_reference.problems.finer import finer as on_finer_cells
+from fem_reference.runs import views
 from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import DrivenCase, MuscleCase
@@ -42,7 +43,8 @@ log = logging.getLogger(__name__)
 
 EXACT = "exact attachments"
 # Files, besides the metrics, whose code makes error bars.
-_MAKING = (differences.__file__, error_bars.__file__, force_bars.__file__, __file__)
+_OF_BARS = [one.__file__ for one in (differences, error_bars, force_bars, views)]
+MAKING = (*map(Path, _OF_BARS), *map(Path(__file__).with_name, ("muscle_bars.py", "refinement.py", "variations.py")))
 
 # The coarse run of a scene with refined tetrahedra omits the last refinement; that of any other scene has a mesh of its own, with
 # tetrahedra larger by this factor.
@@ -226,9 +228,7 @@ def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
 
 
 def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) -> tuple[Bench[C], Run]:
-    """The bench of a changed scene, and the reference's run of it over the frames of ``reference``. Frames that it did not reach,
-    and all frames if the second check denies it, are NaN, so that they have no bar.
-    """
+    """The bench of a changed scene, and its run over the frames of ``reference``: NaN where not reached, and if it is denied."""
     other = Bench(case, bench.store, bench.ranks)
     try:
         run = other.obtain(f"reference, {name}", without_states(case.reference), "reference")
@@ -250,7 +250,7 @@ def _of(reference: Run) -> dict[str, str]:
 def _measuring_hash() -> str:
     """A hash over the source files by which runs are measured."""
     digest = hashlib.sha256()
-    for path in (*sorted(Path(metrics.__file__).parent.glob("*.py")), *map(Path, _MAKING)):
+    for path in (*sorted(Path(metrics.__file__).parent.glob("*.py")), *MAKING):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -133,6 +133,13 @@ def test_it_is_kept_with_its_run_until_the_metrics_change_or_the_file_is_damaged
     assert np.array_equal(again, first)
 
 
+def test_bars_are_stale_as_soon_as_code_that_decides_their_numbers_changes() -> None:
+    """The bars of several muscles, the variations and the part of a run for each muscle, beside the bars themselves."""
+    assert all(path.is_file() for path in refinement.MAKING)
+    makers = {"muscle_bars", "refinement", "variations", "views", "error_bars", "force_bars", "differences"}
+    assert {path.stem for path in refinement.MAKING} == makers
+
+
 def test_the_judge_takes_the_bar_on_both_sides_of_the_value(case) -> None:
     path, within = case / "case.toml", "0.5 %"
     verdict = call(case, "run", "--error-bar")[1]["verdicts"][0]
