@@ -13,7 +13,9 @@ from fem_reference.assessment import neighbours
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import vertex_areas
 from fem_reference.io import files
+from fem_reference.problems import muscles
 from fem_reference.report import pages
+from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscles import exactly_attached
@@ -49,17 +51,33 @@ def growth(own: float, other: float) -> float:
     return 6e-7 * (own + 0.3 * other)
 
 
+def known(problem, number: float) -> dict[str, float]:
+    """Scalars by the names that the reference gives them: each muscle pulls the floor by 1 N in each frame number and more tetrahedra by
+    more, and presses any that it may touch by 0.1 N and by more with stiffer contact.
+    """
+    pressed, found = (0.1 + GIVES * problem.law.stiffness) * number, dict[str, float]()
+    counts = {name: len(one.mesh.tets) for name, one in problem.problems.items()}
+    on = {(name, "floor"): (1 + growth(count, 0)) * number for name, count in counts.items()}
+    on |= {pair: pressed for pair in problem.pairs} | {pair[::-1]: -pressed for pair in problem.pairs}
+    for (name, other), force in on.items():
+        for kind, size in (("force", force), ("moment", 10 * force)):
+            found |= vector_scalars(f"{name}.{kind}_on_{other}", np.array([size, 0.0, 0.0]))
+    found |= {f"{name}.volume_ratio": 1 - 1e-9 * count * number for name, count in counts.items()}
+    return found | ({"touching_area": 2.0 * number, "touching_pressure": 0.01 * number} if problem.pairs else {})
+
+
 def swell(problem, _settings, sink) -> Outcome:
     """In place of the reference: the points of each muscle move away from the origin."""
     counts = [len(one.mesh.tets) for one in problem.problems.values()]
     give = GIVES * 0.1 / problem.law.stiffness
     grows = [growth(*counts) + give, growth(*counts[::-1]) + give]
     for number in problem.frames:
+        scalars = known(problem, number)
         surface, fibres = problem.rest.surface.points.copy(), problem.rest.fibres.points.copy()
         for span, more in zip(problem.spans, grows, strict=True):
             surface[span.vertices] *= 1 + number * more
             fibres[span.fibres] *= 1 + number * more
-        sink(Frame(number, surface, fibres))
+        sink(Frame(number, surface, fibres, scalars=scalars))
     return Outcome("converged", "done", {"seconds": 1.0})
 
 
@@ -134,6 +152,20 @@ def test_further_runs_that_the_second_check_denies_give_no_bar(two, monkeypatch)
     for found in muscle_bars.obtain(bench, reference).values():
         assert found.bars
         assert all(np.isnan(bar.values).all() for bar in found.bars)
+
+
+def test_muscles_that_touch_only_by_the_smoothing_that_a_variation_halves_press_by_nothing_there(
+    two, monkeypatch
+) -> None:
+    """The gap of 0.15 mm is below the smoothing, 0.2 mm, and above half of it; the force between the two, 2 N, is all in doubt."""
+    monkeypatch.setattr(muscles, "_gaps", lambda *_: {("wide", "thin"): 0.15})
+    bench = Bench(casefile.read(two), two / "runs")
+    bars = muscle_bars.obtain(bench, bench.reference())
+    for name, other in (("wide", "thin"), ("thin", "wide")):
+        found = bars[name].find("change", "force_on_bone", other)
+        # Twice the difference between the coarse run and that without contact.
+        assert found.parts["contact between muscles smoothing"] == pytest.approx(2 * 20 * (0.1 + GIVES * 0.1))
+        assert np.isfinite(found.values).all()
 
 
 @pytest.mark.parametrize(("own", "wanted", "ratio"), [((0, 1), (0, 1), 1.5), ((1, 2), (0, 1), 2.0)])
