@@ -52,13 +52,13 @@ def growth(own: float, other: float) -> float:
 
 
 def known(problem, number: float) -> dict[str, float]:
-    """Scalars by the names that the reference gives them: each muscle pulls the floor by 1 N in each frame number and more tetrahedra by
-    more, and presses any that it may touch by 0.1 N and by more with stiffer contact.
+    """Scalars by the names that the reference gives them: each muscle pulls the floor by 1 N per frame number, and by more the more
+    tetrahedra it has; it presses any that it may touch by 0.1 N, and by more with stiffer contact.
     """
     pressed, found = (0.1 + GIVES * problem.law.stiffness) * number, dict[str, float]()
     counts = {name: len(one.mesh.tets) for name, one in problem.problems.items()}
     on = {(name, "floor"): (1 + growth(count, 0)) * number for name, count in counts.items()}
-    on |= {pair: pressed for pair in problem.pairs} | {pair[::-1]: -pressed for pair in problem.pairs}
+    on |= dict.fromkeys(problem.pairs, pressed) | {pair[::-1]: -pressed for pair in problem.pairs}
     for (name, other), force in on.items():
         for kind, size in (("force", force), ("moment", 10 * force)):
             found |= vector_scalars(f"{name}.{kind}_on_{other}", np.array([size, 0.0, 0.0]))
