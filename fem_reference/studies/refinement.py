@@ -178,9 +178,9 @@ def solutions[C: DrivenCase](
     bench: Bench[C], reference: Run, larger: dict[str, C], ratio: float, *, model: bool
 ) -> dict[str, tuple[Bench[C], Run]]:
     """Benches and runs, by name: of the scene on ``larger`` tetrahedra, of ``ratio`` times the size; of this scene with each other
-    cause of error halved; and, with ``model``, of this scene with exact attachments, where it can be solved.
+    cause of error halved; and, with ``model``, of this scene with exact attachments, NaN if it cannot be set up.
     """
-    (base,) = larger.values()
+    ((first, base),) = larger.items()
     scenes = larger | {name: vary(base) for name, vary in needed(bench, reference).items()}
     if model:
         scenes[EXACT] = exactly_attached(base)
@@ -195,7 +195,8 @@ def solutions[C: DrivenCase](
         except InputError as error:
             if name != EXACT:
                 raise
-            log.info("error bar: without the change by exact attachments: %s", error)
+            log.warning("error bar: the change by exact attachments is not known: %s", error)
+            found[name] = found[first][0], complete(found[first][1], reference.numbers, trusted=False)
     return found
 
 

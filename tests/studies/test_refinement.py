@@ -24,6 +24,7 @@ from fem_reference.solvers.common.load_steps import Attempt, StepSizes, march
 from fem_reference.solvers.fenicsx import Settings
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench
+from fem_reference.studies.variations import on_larger
 
 pytestmark = pytest.mark.slow
 
@@ -204,6 +205,19 @@ def test_bars_know_whether_an_attachment_is_by_springs(case, monkeypatch, change
         refinement.obtain(bench, reference, model=model)
     assert [pair.springs for pair in pairs] == [bool(changes)] * 2
     assert [pair.exact is not None for pair in pairs] == [bool(changes), False]
+
+
+def test_a_change_by_exact_attachments_that_cannot_be_solved_is_not_known(case, monkeypatch, caplog) -> None:
+    """A load on what springs attach is such a case: on exact attachments it is refused."""
+    monkeypatch.setattr(refinement, "exactly_attached", lambda one: on_larger(one, 10.0))
+    scene = casefile.read_muscle(case, changes={"attachment[0].stiffness": "100 kPa/mm"})
+    bench = Bench(scene, case.parent / "runs")
+    bars = refinement.obtain(bench, bench.reference())
+    assert "error bar: the change by exact attachments is not known: error bar, exact attachments: got" in caplog.text
+    bar = refinement.stored(bench.reference()).find("change", "surface_deviation", "rms")
+    assert np.isnan(bar.model).all()
+    assert np.isfinite(bar.values).all()
+    assert bars.sizes == (6.0, 9.0)
 
 
 def test_sizes_that_make_no_other_mesh_are_refused(case, monkeypatch) -> None:
