@@ -43,7 +43,7 @@ log = logging.getLogger(__name__)
 
 EXACT = "exact attachments"
 # Files, besides the metrics, whose code makes error bars.
-_OF_BARS = [one.__file__ for one in (differences, error_bars, force_bars, views)]
+_OF_BARS = [str(one.__file__) for one in (differences, error_bars, force_bars, views)]
 MAKING = (*map(Path, _OF_BARS), *map(Path(__file__).with_name, ("muscle_bars.py", "refinement.py", "variations.py")))
 
 # The coarse run of a scene with refined tetrahedra omits the last refinement; that of any other scene has a mesh of its own, with
