@@ -1,6 +1,7 @@
 """Error bars of several muscles by a stand-in for the solver: each has an error of its own and a share of its neighbour's."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import stand_ins
 
 from fem_reference import cli, error_bars, metrics, report, solve
 from fem_reference.assessment import neighbours
+from fem_reference.assessment.error_bars import FILE
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import vertex_areas
 from fem_reference.io import files
@@ -144,14 +146,64 @@ def test_each_muscle_has_bars_of_its_own_pair_with_all_meshes_coarser(two, monke
             error_bars(case, reference, muscle=name, store=store)
 
 
-def test_further_runs_that_the_second_check_denies_give_no_bar(two, monkeypatch) -> None:
-    stand_ins.deny_further_runs(monkeypatch)
+@pytest.mark.parametrize("ended", ["denied", "diverged"])
+def test_further_runs_that_the_second_check_denies_or_that_diverge_give_no_bar(two, monkeypatch, ended) -> None:
+    counts = list[int]()
+
+    def fail(problem, settings, sink) -> Outcome:
+        counts.append(len(problem.rest.mesh.tets))
+        if counts[-1] == counts[0]:
+            return swell(problem, settings, sink)
+        swell(problem, settings, lambda frame: None if frame.number else sink(frame))
+        return Outcome("diverged", "no")
+
+    if ended == "denied":
+        stand_ins.deny_further_runs(monkeypatch)
+    else:
+        stand_ins.solve_by(monkeypatch, fenicsx, fail)
     bench = Bench(casefile.read(two), two / "runs")
     reference = bench.reference()
     assert reference.outcome.status == "converged"
     for found in muscle_bars.obtain(bench, reference).values():
-        assert found.bars
-        assert all(np.isnan(bar.values).all() for bar in found.bars)
+        assert {bar.metric for bar in found.bars} > {"surface_deviation", "force_on_bone"}
+        assert all(np.isnan(bar.values[1:]).all() for bar in found.bars)
+
+
+def test_bars_are_of_all_muscles_or_of_none_and_of_this_code(two) -> None:
+    bench = Bench(casefile.read(two), two / "runs")
+    reference = bench.reference()
+    assert muscle_bars.stored(bench, reference) == {}
+    muscle_bars.obtain(bench, reference)
+    places = {name: reference.folder / name / FILE for name in SIZES}
+    whole = places["thin"].read_text()
+    places["thin"].unlink()
+    assert muscle_bars.stored(bench, reference) == {}, "one is missing"
+    table = json.loads(whole)
+    places["thin"].write_text(json.dumps(table | {"of": table["of"] | {"metrics": "others"}}))
+    assert muscle_bars.stored(bench, reference) == {}, "one is stale"
+    made = muscle_bars.bars(bench, reference, "thin")
+    assert places["thin"].read_text() == whole
+    assert set(muscle_bars.stored(bench, reference)) == set(SIZES)
+    volume = made.find("change", "volume", "deviation")
+    assert set(volume.parts) > {"tetrahedra", "surface in tetrahedra"}
+    # The muscles do not press each other: no cause of error is contact.
+    apart = replace(reference, scalars=reference.scalars | {"touching_area": np.zeros(len(reference.numbers))})
+    lone = muscle_bars.obtain(bench, apart)["thin"]
+    assert set(lone.find("change", "volume", "deviation").parts) == {"tetrahedra", "surface in tetrahedra"}
+
+
+def test_what_a_muscle_cannot_touch_does_not_make_its_bars_longer(two, monkeypatch) -> None:
+    """The difference of forces on the floor by the closed form of a single value, which is of order 1 on sizes h and 1.5 h."""
+    monkeypatch.setattr(muscles, "_gaps", lambda *_: {("wide", "thin"): 1.0})
+    bench = Bench(casefile.read(two), two / "runs")
+    bars = muscle_bars.obtain(bench, bench.reference())
+    problems = [Bench(one, two).problem().problems for one in (bench.scene, muscle_bars.coarser(bench.scene)[0])]
+    for name, size in SIZES.items():
+        fine, coarse = (growth(len(one[name].mesh.tets), 0) for one in problems)
+        left = 1.25 * 1.2 / 0.5 * max(1.0, size / np.sqrt(AREAS[name] / np.pi))
+        found = bars[name].find("change", "force_on_bone", "floor")
+        assert found.parts["tetrahedra"] == pytest.approx(left * 20 * (fine - coarse), rel=1e-6)
+        assert bars[name].find("change", "force_on_bone", "thin" if name == "wide" else "wide") is None
 
 
 def test_muscles_that_touch_only_by_the_smoothing_that_a_variation_halves_press_by_nothing_there(
