@@ -8,7 +8,7 @@ import numpy as np
 
 from fem_reference.assessment.run_checks import BALANCE, ROUNDING, RunCheck
 from fem_reference.effects import region_of
-from fem_reference.foundations.mesh import Floats, TetMesh
+from fem_reference.foundations.mesh import Floats, TetMesh, upright
 from fem_reference.geometry.quadratic import Displaced
 from fem_reference.problems.body import Body
 from fem_reference.runs.store import Frame, Run
@@ -54,9 +54,12 @@ def _load(body: Body, frame: float) -> Floats | None:
     if not all(type(one).__module__.startswith("fem_reference.effects.") for one in body.effects):
         return None
     acting, mesh = [one for one in body.effects if one.outer], body.mesh
-    if acting and (mesh.kind != "tetrahedron" or mesh.degree > 1 or any(map(region_of, acting))):
+    if not acting:
+        return np.zeros(3)
+    if mesh.kind != "tetrahedron" or mesh.degree > 1 or any(map(region_of, acting)):
         return None
-    rest = Displaced(TetMesh(mesh.points, mesh.cells, mesh.facets))  # the present positions are not known
+    cells = upright(mesh.points, mesh.cells)
+    rest = Displaced(TetMesh(mesh.points, cells, mesh.facets))  # the present positions are not known
     found = [(one.amount(frame), one.resultant(rest)) for one in acting]
     forces = [amount * load.force for amount, load in found if load is not None]
-    return None if len(forces) < len(acting) else np.sum([np.zeros(3), *forces], axis=0)
+    return None if len(forces) < len(acting) else np.sum(forces, axis=0)

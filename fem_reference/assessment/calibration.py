@@ -38,9 +38,7 @@ _ENDED = "a run that the fit needs has no answer"
 
 @dataclass(frozen=True)
 class Measurement:
-    """A measurement: the ``value`` of a ``quantity`` at a ``frame``, with its standard deviation ``sd``, both in ``unit``; its
-    ``place`` in the file.
-    """
+    """A measurement: ``value`` and standard deviation ``sd``, in ``unit``, of a ``quantity``; ``place``: in the file."""
 
     frame: int
     quantity: str

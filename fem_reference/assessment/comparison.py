@@ -24,8 +24,7 @@ from fem_reference.scenes.case import Case, Expectation
 
 @dataclass(frozen=True)
 class Convergence:
-    """The same case on successively halved meshes: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the two finest
-    meshes.
+    """A case on successively halved meshes: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the two finest meshes.
 
     ``against`` defines the error: the L2 distance to the exact solution, or the rms distance at the vertices from the finest
     solution of order 2. ``order`` is NaN if the errors are rounding.

@@ -25,8 +25,7 @@ class Omission:
     ``instead``: settings that had to change with them. A run that was not made has the status ``"refused"``.
 
     ``changes``: by ``metric.statistic``, the greatest magnitude over the frames of the change from the complete run; left out if
-    unknown in a frame. ``predicted``: the value of an indicator, if any, by ``metric.statistic``. ``costs``: by name, as in the
-    run.
+    unknown in a frame. ``predicted``: the value of an indicator, if any, by ``metric.statistic``. ``costs``: as in the run.
     """
 
     left_out: tuple[str, ...]

@@ -68,8 +68,7 @@ class Failure:
 class Band:
     """The band of a ``quantity`` over frame ``numbers`` (f,), in ``unit``: 5th percentile ``low``, ``median`` and 95th percentile
     ``high`` (f,), and the result of the case, ``nominal``; NaN if the quantity is not defined. ``bar`` (f,): the numerical error
-    bar of this result, None if it has none. ``distance``: True for a distance from this result; smaller values are then always
-    inside.
+    bar of this result, None if it has none. ``distance``: True for a distance from this result; smaller values are always inside.
 
     ``error``: of the surrogate, as a share of the variance, at runs excluded from its fit; NaN without a surrogate. ``by``: the
     source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: the reason why there is no band, else empty.
@@ -140,8 +139,7 @@ class Placed:
 class Uncertainty:
     """The bands of a case from a number of ``runs`` of a design with a ``seed``, some of them ``failures``; ``fixed``: titles of
     the numbers that were not varied; ``size`` [mm] of the tetrahedra; ``lost``: the reasons why candidates have no run;
-    ``seconds``: mean processor time of a run; ``refused``: the reason why there are no runs, if the case itself has no solution,
-    else empty.
+    ``seconds``: mean processor time of a run; ``refused``: the reason if the case itself has no solution, else empty.
     """
 
     case: str

@@ -106,8 +106,7 @@ class Change:
 @dataclass(frozen=True, eq=False)
 class Versions:
     """``current`` compared with an earlier state (``was``, in words): ``changes``, the worst first; the distance ``moved`` (f, k)
-    [mm] of each of the ``vertices`` (k,) since then; and the earlier positions (f, n, 3) [mm], None if only some vertices are
-    known.
+    [mm] of each of ``vertices`` (k,); and the earlier positions (f, n, 3) [mm], None if only some vertices are known.
     """
 
     current: CurrentMeasures

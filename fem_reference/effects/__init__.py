@@ -28,6 +28,7 @@ from fem_reference.foundations.material_point import FieldState as FieldState
 from fem_reference.foundations.material_point import Moduli as Moduli
 from fem_reference.foundations.material_point import Place as Place
 from fem_reference.foundations.material_point import State as State
+from fem_reference.foundations.mesh import Bools, Floats
 from fem_reference.foundations.records import Record, increasing, parse
 from fem_reference.foundations.units import PositivePressure, unit_of, written
 
@@ -181,6 +182,10 @@ class Load(Effect):
     stored: ClassVar[bool] = False
     example: ClassVar[dict[str, Any]] = {"on": "top"}
     on: str
+
+    def along(self, normals: Floats) -> Bools:
+        """True (f, 3) for the axes along which the load may act on facets with ``normals`` (f, 3), of which the sizes count."""
+        return np.ones(normals.shape, bool)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
         """Force per rest area [MPa], (3,), for the outward unit normal ``normal`` (3,) at rest."""

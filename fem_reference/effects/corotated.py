@@ -14,8 +14,7 @@ class Corotated(LameLaw):
     consistent invertible elasticity, eq. 8).
 
     ``mu``, ``lame``: Lame's parameters [MPa]. ``|F - R|^2`` is ``I1 - 2 s + 3``, where s is the sum of the principal stretches, the
-    greatest root of ``(s^2 - I1)^2 = 4 (I2 + 2 J s)``. For J < 0, four steps of Newton's method leave an energy up to 6 % too
-    small.
+    greatest root of ``(s^2 - I1)^2 = 4 (I2 + 2 J s)``. For J < 0, four Newton steps leave an energy up to 6 % too small.
     """
 
     def energy(self, state: State) -> Any:

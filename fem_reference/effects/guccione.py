@@ -14,8 +14,7 @@ class Guccione(Energy):
 
     ``c`` [MPa]; ``bf``, ``bt``, ``bfs`` without unit. Source: Guccione, McCulloch and Waldman 1991, doi 10.1115/1.2894084, as in
     Land et al. 2015, doi 10.1098/rspa.2015.0641, both for incompressible material. Without the factor ``J^(-2/3)`` the pressure
-    unknown has to balance all of a large tension, and in the ventricle of Land et al. two layers of mixed elements lose
-    equilibrium.
+    unknown balances all of a large tension, and in the ventricle of Land et al. two layers of mixed elements lose equilibrium.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)

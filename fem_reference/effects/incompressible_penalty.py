@@ -1,6 +1,4 @@
-"""Near-incompressibility by a penalty on volume change, without a pressure unknown; elements may lock that do not lock in the mixed
-form.
-"""
+"""Near-incompressibility by a penalty on volume change, without a pressure unknown; some elements lock only in this form."""
 
 from typing import Any
 

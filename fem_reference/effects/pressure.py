@@ -7,6 +7,9 @@ from fem_reference.effects import Load, Ramped, State
 from fem_reference.foundations import units
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.loads import Shape, Wrench
+from fem_reference.foundations.mesh import Bools, Floats
+
+_ROUNDED = 1e-6  # components of unit normals, of which files with 32 bits know no more
 
 
 class Pressure(Ramped, Load):
@@ -32,6 +35,10 @@ class Pressure(Ramped, Load):
         """The load on the entire part in its present shape."""
         found = shape.facing(self.on)
         return None if found is None else Wrench(*(-self.pressure * one for one in found))
+
+    def along(self, normals: Floats) -> Bools:
+        """True for the components of the normals, but for rounding."""
+        return normals > _ROUNDED
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
         load = -state.amount * self.pressure

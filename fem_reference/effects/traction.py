@@ -4,9 +4,12 @@ import math
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
+import numpy as np
+
 from fem_reference.effects import Load, Ramped, State
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.loads import Shape, Wrench, dead
+from fem_reference.foundations.mesh import Bools, Floats
 from fem_reference.foundations.units import PressureVector
 
 
@@ -28,6 +31,10 @@ class Traction(Ramped, Load):
     def resultant(self, shape: Shape) -> Wrench:
         """The load on the entire part."""
         return dead(self.force, shape, self.on)
+
+    def along(self, normals: Floats) -> Bools:
+        """True for the components of the force."""
+        return np.broadcast_to(np.array(self.force) != 0, normals.shape)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:  # noqa: ARG002
         return [state.amount * entry for entry in self.force]

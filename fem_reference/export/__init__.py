@@ -25,8 +25,8 @@ _FEBIO_FILES = """\
 | `tet10.csv` | the ten nodes of each element of `scene.feb`, in FEBio's order |
 """
 _FEBIO_OF_ALL = """
-`scene.feb` is one file of all muscles for FEBio (format 4.0). It logs `nodes_NAME.txt`: put that of a muscle into its folder as
-`nodes.txt`, and run the script of `FEBIO.md` there.
+`scene.feb` is one file of all muscles for FEBio (format 4.0). FEBio writes `nodes_NAME.txt` for each muscle: move it to the
+folder `NAME` as `nodes.txt`, and run the script of `FEBIO.md` there.
 """
 _NO_DIFFERENCE = "no springs at points of the surface, no bone that overlaps the muscle at rest"
 
@@ -72,7 +72,7 @@ def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, more: str) ->
 
 
 def _write_several(case: Case, problem: MusclesProblem, folder: Path, form: Format) -> None:
-    """Write a folder for each muscle, and a text for all."""
+    """Write a folder for each muscle, and a text for all of them."""
     for part, (name, one) in zip(_parts(case), problem.problems.items(), strict=True):
         (folder / name).mkdir()
         _write(part.model_copy(update={"name": case.name}), one, folder / name, "")
@@ -94,5 +94,5 @@ def _write_febio(case: Case, problem: CaseProblem, folder: Path) -> None:
         differences = febio_contact.notes(_muscle(problem))
         febio.write(_muscle(problem), folder)
     for difference in differences:
-        log.warning("another model in FEBio: %s", difference)
+        log.warning("FEBio's model differs: %s", difference)
     write_text(folder / "FEBIO.md", case, here="".join(f"- {one}\n" for one in differences or [_NO_DIFFERENCE]))

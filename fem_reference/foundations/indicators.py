@@ -96,8 +96,7 @@ class Estimates:
 
     def straighten(self, pull: float) -> float:
         """Displacement [mm] of the surface, root mean square, by the ``pull`` [MPa] of fibres in a beam with clamped ends: at most
-        0.6 of the beam's sag, against its bending stiffness; inclined fibres also shear the beam. Without two clamped ends the beam
-        shortens.
+        0.6 of the beam's sag, against its bending stiffness; inclined fibres also shear the beam. Without both clamps it shortens.
         """
         if self.fixed < 2:
             return self.shorten(pull, 0.3)

@@ -31,9 +31,7 @@ class Shape(Protocol):
     """The present shape of a body, and its velocity."""
 
     def measure(self, on: str | None = None) -> tuple[float, Floats]:
-        """The volume [mm3] at rest, or the area [mm2] of a region ``on``, and the integral (3,) of the present positions over it;
-        NaN if these are unknown.
-        """
+        """Volume [mm3] at rest, or area [mm2] of a region ``on``; integral (3,) of present positions over it; NaN if unknown."""
 
     def facing(self, on: str) -> tuple[Floats, Floats] | None:
         """The present vector area (3,) [mm2] of a region, outward, and its moment (3,) [mm3] about the origin; None if unknown."""

@@ -11,8 +11,7 @@ import numpy as np
 class Functions:
     """Functions that an expression may call besides operators: in numpy, symbolically, or with derivatives.
 
-    ``above(x, limit, then, otherwise)`` is ``then`` where ``x > limit``, else ``otherwise``; both are evaluated everywhere and must
-    be finite.
+    ``above(x, limit, then, otherwise)`` is ``then`` where ``x > limit``, else ``otherwise``; both must be finite everywhere.
     """
 
     exp: Callable[[Any], Any]

@@ -17,6 +17,7 @@ from fem_reference.foundations.errors import InputError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 # The greatest coordinate [mm] of a surface: a thousand kilometres.
 FARTHEST = 1e9
@@ -122,6 +123,11 @@ def tet_volumes(points: Floats, tets: Ints) -> Floats:
     """Signed volume of each of the ``tets`` (k, 4) between ``points`` (n, 3) [mm], (k,) [mm3]."""
     a, b, c, d = (points[tets[:, corner]] for corner in range(4))
     return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6)
+
+
+def upright(points: Floats, tets: Ints) -> Ints:
+    """The ``tets`` (k, 4) between ``points`` (n, 3), those of negative volume with two corners exchanged."""
+    return np.where((tet_volumes(points, tets) < 0)[:, None], tets[:, [0, 2, 1, 3]], tets)
 
 
 def tet_qualities(points: Floats, tets: Ints) -> Floats:

@@ -130,9 +130,7 @@ def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
 
 
 def farthest_points(points: Floats, count: int) -> Ints:
-    """The indices (count,) of ``points`` (n, d): first the farthest from their mean, then always the farthest from the chosen
-    points.
-    """
+    """Indices (count,) of ``points`` (n, d): first the farthest from their mean, then always the farthest from those chosen."""
     chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     away = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):

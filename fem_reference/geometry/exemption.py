@@ -108,9 +108,7 @@ class Exemption:
         return np.asarray(self.away(self.pieces.parents, self._places.mean(axis=1))[0] > self.reach)
 
     def places(self, count: int) -> csr_array:
-        """About ``count`` evenly chosen points that can be in contact, as the matrix from positions of the vertices to positions of
-        the points.
-        """
+        """A matrix from positions of vertices to those of about ``count`` evenly chosen points that can be in contact."""
         felt = np.flatnonzero(self.corners.away > self.reach)
         return self.corners.carried[felt[:: max(1, len(felt) // count)]]
 

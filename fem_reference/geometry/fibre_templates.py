@@ -2,8 +2,7 @@
 
 Their method uses isocontours on the surface. Here each contour is the rim of a section of the Laplace field in tetrahedra, and a
 harmonic map of that section gives the points inside. These points are in the muscle; between sections, lines may leave the muscle
-where it bends. A muscle with several heads is followed along its largest section only; where it gains or loses a head, lines are
-twisted.
+where it bends. Only the largest section of a muscle with several heads is followed; where a head begins or ends, lines are twisted.
 """
 
 from dataclasses import dataclass

@@ -6,12 +6,11 @@ from functools import cached_property
 
 import numpy as np
 import skfem
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from skfem.models.poisson import laplace
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, tet_volumes
+from fem_reference.foundations.mesh import Bools, Floats, Ints, Polylines, Surface, TetMesh, tet_volumes
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.nested import EDGES
@@ -22,7 +21,6 @@ _NEAR = 1e-3  # a line has arrived where the field is this close to 0 or 1
 _TIES = 1e-6
 _HALFWAY = 0.5 - _TIES  # a field value of 1/2 up to rounding counts as above it
 
-Bools = NDArray[np.bool_]
 # From cells (n,) and rest points (n, 3) in them to unit vectors (n, 3); picklable.
 Directions = Callable[[Ints, Floats], Floats]
 

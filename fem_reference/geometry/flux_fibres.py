@@ -79,8 +79,7 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
 
 
 def streamlines(flux: Flow, count: int) -> Polylines:
-    """``count`` lines of 40 points each along a ``flux``, each for the same area of both attachments; InputError if fewer can be
-    traced.
+    """``count`` lines of 40 points along a ``flux``, each for the same area of both attachments; InputError if fewer can be traced.
 
     Many lines start evenly over the area; the lines kept are the middles of groups that are compact at both ends (Lloyd 1982),
     measured in units of the size of each attachment.

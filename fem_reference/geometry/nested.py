@@ -1,9 +1,9 @@
 """Refinement of each tetrahedron into eight: nested, graded towards rims, with the boundary moved onto the filled surface."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import (
+    Bools,
     Floats,
     Ints,
     Surface,
@@ -12,6 +12,7 @@ from fem_reference.foundations.mesh import (
     enclosed_volume,
     tet_qualities,
     tet_volumes,
+    upright,
 )
 from fem_reference.geometry.coarsening import inflate
 from fem_reference.geometry.distance import distances
@@ -37,8 +38,6 @@ GRADED = 0.25
 # A point moves towards the surface as long as the tets around it keep these shares of their volume and of their quality.
 _KEPT_VOLUME, _KEPT_QUALITY = 0.3, 0.5
 _ROUNDS, _SHORTER = 12, 0.6
-
-Bools = NDArray[np.bool_]
 
 
 def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) -> TetMesh:
@@ -83,9 +82,7 @@ def _eighths(points: Floats, nodes: Ints) -> Ints:
     ends = points[nodes[:, _DIAGONALS]]
     shortest = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2).argmin(axis=1)
     tets = np.take_along_axis(nodes, PARTS[shortest].reshape(len(nodes), -1), axis=1).reshape(-1, 4)
-    turned = tet_volumes(points, tets) < 0
-    tets[turned] = tets[turned][:, [0, 2, 1, 3]]
-    return tets
+    return upright(points, tets)
 
 
 def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:

@@ -65,9 +65,7 @@ class Quadric:
         return np.asarray(turn @ turn.T)
 
     def pushed(self, points: Floats) -> Floats:
-        """The ``points`` (n, 3), with points inside moved to the surface along its normal; points deep inside are first moved off
-        the axis.
-        """
+        """``points`` (n, 3), those inside moved to the surface along its normal, those deep inside first moved off the axis."""
         own, thin = self._own(points), int(np.argmin(self.radii))
         own[np.sum((own / self.radii) ** 2, axis=1) < _MIDDLE**2, thin] = _MIDDLE * self.radii[thin]
         size = np.sqrt(np.sum((own / self.radii) ** 2, axis=1))

@@ -4,15 +4,12 @@ from dataclasses import dataclass, replace
 
 import igl
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas, unit_normals
+from fem_reference.foundations.mesh import Bools, Floats, Ints, Surface, triangle_areas, unit_normals
 from fem_reference.geometry.coarsening import flip_edges, free_part, inflate, slide
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.edges import Edges
-
-Bools = NDArray[np.bool_]
 
 _ROUNDS = 4  # of collapses, flips and slides
 _SHORT = 0.4  # Edges at a rim shorter than this are collapsed; in sizes of a triangle.

@@ -39,7 +39,7 @@ class Displaced:
     def measure(self, on: str | None = None) -> tuple[float, Floats]:
         """The volume [mm3] at rest, or the area [mm2] of a region, and the integral (3,) of the present positions over it."""
         if on is None:
-            sizes = np.abs(tet_volumes(self.mesh.points, self.mesh.tets))
+            sizes = tet_volumes(self.mesh.points, self.mesh.tets)
             means = np.einsum("q,kqi->ki", _BULK, self.nodes)
         else:
             tets, local = self._facets(on)

@@ -77,9 +77,7 @@ def halton_centres(points: Floats, count: int) -> Floats:
 
 
 def greedy_centres(points: Floats, values: Floats, count: int, shape: float, *, terms: int = 0) -> Floats:
-    """``count`` of the ``points`` (n, d): each is the point at which the sum with the previous centres deviates most from
-    ``values`` (n,).
-    """
+    """``count`` of the ``points`` (n, d): each is where the sum with the previous centres deviates most from ``values`` (n,)."""
     chosen = list(np.argsort(-np.abs(values - values.mean()), kind="stable")[: terms + 1])
     while len(chosen) < count:
         off = np.abs(values - radial_sum(points, values, points[chosen], shape, terms=terms)(points))

@@ -4,17 +4,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, diags_array
 from scipy.sparse.linalg import splu
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, enclosed_volume, triangle_areas
+from fem_reference.foundations.mesh import (
+    Bools,
+    Floats,
+    Ints,
+    Surface,
+    connected_parts,
+    enclosed_volume,
+    triangle_areas,
+)
 from fem_reference.geometry.coarsening import flip_edges, free_part
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.parts import Parts, between, relaxed, widened
 from fem_reference.geometry.sectors import attached_area, sectors, shares_at
-
-Bools = NDArray[np.bool_]
 
 # Chosen by trials on the report's muscles and our own hip. Smoothing length of the shares in triangle sizes; more rounds corners.
 _SMOOTHED = 0.1

@@ -180,9 +180,7 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
 
 
 def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
-    """The grid of :func:`build` at the spacing of :func:`resolve`, stored in ``folder`` under a hash of everything on which it
-    depends.
-    """
+    """The grid of :func:`build` at the spacing of :func:`resolve`, stored in ``folder`` under a hash of all that determines it."""
     code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
     name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
 

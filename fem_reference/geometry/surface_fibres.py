@@ -57,8 +57,7 @@ def _halfway(lines: Floats) -> Floats:
 
 def outermost(lines: Polylines, count: int) -> Polylines:
     """At most ``count`` of ``lines``, with 40 points each: the line that is outermost halfway in each of ``count`` sectors. Sectors
-    are equal after a stretch that makes the section of the lines as wide in all directions, so that a flat muscle has lines on all
-    sides.
+    are equal after a stretch that makes the section as wide in all directions, so that a flat muscle has lines on all sides.
     """
     found = _alike(lines, 0)
     arms = _halfway(found)

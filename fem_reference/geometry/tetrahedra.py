@@ -25,6 +25,7 @@ from fem_reference.foundations.mesh import (
     enclosed_volume,
     tet_volumes,
     triangle_areas,
+    upright,
 )
 from fem_reference.geometry.coarsening import coarsen
 from fem_reference.geometry.distance import distances
@@ -199,7 +200,7 @@ def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
     if not abs(got - wanted) <= _VOLUME_WITHIN * wanted:
         volumes_got = f"tetrahedra of {got:.0f} mm3 in a surface of {wanted:.0f} mm3"
         raise InputError(surface.place, volumes_got, "one clean body")
-    return TetMesh(points, np.where((volumes < 0)[:, None], tets[:, [0, 2, 1, 3]], tets), maker=mesh.maker)
+    return TetMesh(points, upright(points, tets), maker=mesh.maker)
 
 
 def _largest_part(tets: Ints, place: str) -> Ints:

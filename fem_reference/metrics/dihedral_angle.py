@@ -25,8 +25,7 @@ OF, AGAINST = "surface", "reference"
 
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
     """Statistics over the edges of the angle minus the reference's angle [deg], in (-180, 180]: the signed ``mean`` (above zero:
-    more convex) and the ``rms``; for the magnitude the mean (``mean_magnitude``), the 95th percentile (``p95``) and the greatest
-    (``max``).
+    more convex) and the ``rms``; for the magnitude the mean (``mean_magnitude``), 95th percentile (``p95``) and greatest (``max``).
 
     An edge is weighted by the area around it at rest, a third of its two triangles. In ``mean_magnitude_of_edges`` all edges have
     the same weight, as in the report. NaN in a frame where a triangle has collapsed: it has no angle.

@@ -1,7 +1,6 @@
 """Shares of a run's surface that are inside out or lie within another part of the body, against the reference.
 
-The shares are computed from the surface alone, so every run has them. For a solver with an interior, the smallest det F is
-stricter.
+The shares need only the surface, so every run has them. For a solver with an interior, the smallest det F is stricter.
 """
 
 from functools import lru_cache

@@ -3,7 +3,8 @@ moment is positive if it turns the bone to greater angles; its moment arm is the
 By virtual work, without dissipation, the moment is minus the slope of the stored energy in the angle. Lines of action pull at their
 ends, via-points and obstacles. The force is not known for lines without ``hill`` and for most fast solvers.
 
-The arm differs from the arm by the excursion of fibres: a bent matrix carries a moment with little force (docs/measures.md).
+The arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with little
+force (docs/measures.md).
 """
 
 from functools import partial

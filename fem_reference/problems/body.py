@@ -43,8 +43,7 @@ def is_stabilised(element: str) -> bool:
     """True for an element with displacement and pressure of the same degree: its pressure would oscillate without stabilisation.
 
     The added energy is ``-1 / (4 mu) integral of (p - its mean in the cell)^2``, with the cell's shear modulus mu at rest: the mean
-    of the second derivatives of the energy with respect to F_ij, i != j. The added energy decreases with the square of the cell
-    size.
+    of the second derivatives of the energy with respect to F_ij, i != j. This energy decreases with the square of the cell size.
 
     Source: Dohrmann and Bochev 2004, doi 10.1002/fld.752; with 2 mu as in White and Borja 2008, doi 10.1016/j.cma.2008.05.015.
     """

@@ -50,8 +50,8 @@ def check(body: Body, element: str, quadrature_degree: int | None = None) -> Non
     _check_prescribed(body.prescribed)
     fixed = [entry.on for entry in body.prescribed if isinstance(entry.on, str)]
     contact = [body.contact.on] if body.contact and isinstance(body.contact.on, str) else []
-    loaded = [effect.on for effect in body.effects if isinstance(effect, Load)]
-    used = dict.fromkeys([*fixed, *contact, *loaded, *(on for law in body.touching for on in (law.one, law.other))])
+    loads = [effect.on for effect in body.effects if isinstance(effect, Load)]
+    used = dict.fromkeys([*fixed, *contact, *loads, *(on for law in body.touching for on in (law.one, law.other))])
     for on in used:
         if on not in body.mesh.facets:
             raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(map(str, body.mesh.facets))}")
@@ -232,7 +232,7 @@ def _check_needs(body: Body) -> None:
 
 def check_agreement(body: Body) -> None:
     """Raise InputError if a part of the body lacks a law (``regions.check``), the normal of a law is along fibres, a tendon or
-    friction is combined with tension at rest, a load is on a part that is prescribed exactly, two regions of its surface prescribe
+    friction is combined with tension at rest, a load acts along prescribed axes alone, two regions of its surface prescribe
     different exact displacements at shared places, or a path of motion cannot be followed. Displacements are compared at all
     frames, at all stops, and halfway between them.
     """

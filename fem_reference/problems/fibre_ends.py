@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, corner_areas
+from fem_reference.foundations.mesh import Bools, Floats, Ints, Polylines, Surface, corner_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.distance import Distances, distances
 from fem_reference.geometry.exemption import Exemption
@@ -16,8 +15,6 @@ from fem_reference.problems.setup import AttachedVertices
 # The greatest distance [mm] at which an end counts as reaching its attachment: the muscle there practically moves with the bone.
 REACHES = 2.0
 SIDES = ("first", "last")  # ends of a fibre
-
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -111,8 +111,7 @@ def axis_of(rest: Setup) -> Floats:
 
 def sag(rest: Setup, frames: list[int], travel: float) -> float:
     """The deviation [mm] of the axis from the straight line between two attachments: the sum of the deviation at rest in the middle
-    third, the deviation by turning bones, and a twentieth of the travel (a sideways shift bends the axis into two waves, which are
-    stiffer).
+    third, the deviation by turning bones, and a twentieth of the travel (a sideways shift bends the axis into two stiffer waves).
     """
     if len(rest.attached) < 2:
         return 0.0

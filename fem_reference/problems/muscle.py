@@ -76,7 +76,7 @@ class MuscleProblem(Setup):
     skin: Skin | None = None
     attached_skins: dict[str, Skin] = field(default_factory=dict)
     mesh_facts: dict[str, float | str] = field(default_factory=dict)
-    spans: ClassVar[tuple[()]] = ()  # of several muscles
+    spans: ClassVar[tuple[()]] = ()  # the parts of joined arrays, only for several muscles
     seconds: float = 0.0
 
     @cached_property
@@ -92,7 +92,7 @@ class MuscleProblem(Setup):
 
     @property
     def rest(self) -> AtRest:
-        """All rest shapes that the frames move."""
+        """The rest state of everything whose positions a frame contains."""
         return AtRest(self.surface, self.fibres, self.mesh, self.directions)
 
     @cached_property
@@ -176,7 +176,7 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
 def assembled(
     rest: Setup, mesh: TetMesh, effects: tuple[Effect, ...], lines: tuple[Polylines, Directions | None], apart: float
 ) -> MuscleProblem:
-    """The set-up ``rest`` filled with a ``mesh`` and fibres (``lines``); points of contact and of springs are ``apart`` [mm]."""
+    """``rest`` filled with a ``mesh`` and fibres (``lines``); ``apart`` [mm]: the spacing of contact and spring points."""
     springs = {
         one.attachment: attached_skin(rest.surface, attached_shares(rest.surface, one.vertices), mesh, apart)
         for one in rest.attached
@@ -205,7 +205,7 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 
 
 def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
-    """Tetrahedra of a ``size`` [mm] with the facets of attachments: within the rims if the mesher keeps these, else below."""
+    """Tetrahedra of a ``size`` [mm]. Attachments have the facets inside their rims if the mesher keeps rims, else those below."""
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
     mesh = block.fill(rest.surface, size) if case.muscle.mesher == "block" else filled(rest.surface, size)

@@ -106,7 +106,7 @@ class MusclesProblem:
 
     @cached_property
     def rest(self) -> AtRest:
-        """All rest shapes that the frames move, muscle after muscle."""
+        """The rest state of everything whose positions a frame contains, muscle after muscle."""
         found = list(self.problems.values())
         counts = np.concatenate([np.diff(one.fibres.offsets) for one in found])
         known = [one.directions for one in found]

@@ -76,9 +76,7 @@ def longest_edge(mesh: Cells, law: Touching) -> float:
 
 
 def beyond_rim(body: Body, side: str, other: str) -> Ints:
-    """The facets (f, 3 or 4) of the skin around the part ``other``, on the same piece, which the part ``side`` may not touch; none
-    if a part touches itself.
-    """
+    """Facets (f, 3 or 4) of the skin around ``other``, on the same piece, that ``side`` may not touch; none in self-contact."""
     mesh, facets = body.mesh, outer_facets(body.mesh)[0]
     laws = [(law.one, law.other) for law in body.touching]
     named = [mesh.facets[two] for one, two in [*laws, *(law[::-1] for law in laws)] if one == side]

@@ -40,4 +40,4 @@ class Problem(Protocol):
 
     @property
     def rest(self) -> AtRest:
-        """The rest shapes that the frames move."""
+        """The rest state of everything whose positions a frame contains."""

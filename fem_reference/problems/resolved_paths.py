@@ -36,9 +36,7 @@ _SHORTEST = 1e-9  # the share of all frames within which a long motion counts as
 
 @dataclass(frozen=True)
 class Moving:
-    """Points (p, 3) [mm] by frame number (``at``), their known ``turning``, name in messages (``place``); ``scale``: True for an
-    amount.
-    """
+    """Points (p, 3) [mm] ``at`` a frame number, known ``turning``, ``place`` in messages; ``scale``: True for an amount."""
 
     place: str
     at: Callable[[float], Floats]
@@ -124,9 +122,7 @@ def _grid(thing: Moving, frames: Sequence[float]) -> Floats:
 
 
 class _Samples:
-    """Samples of things at ``frames`` (m,): places (m, p, 3), rotations (m,) [rad], path lengths (m, p) [mm] without the common
-    motion.
-    """
+    """Samples at ``frames`` (m,): places (m, p, 3), rotations (m,) [rad], path lengths (m, p) [mm] without the common motion."""
 
     def __init__(self, things: Sequence[Moving], frames: Floats, size: float) -> None:
         self.things, self.frames, self.size = things, frames, size

@@ -97,7 +97,7 @@ class AttachedVertices:
 @dataclass(frozen=True, eq=False)
 class Setup:
     """The set-up of a muscle, as needed by a surface solver: its ``surface`` at rest, the bones, the attached vertices, and the
-    requested frames. ``interval`` [s]: the time from a frame number to the next, if the case states it. ``start``: a function from
+    requested frames. ``interval`` [s]: the time between successive frame numbers, if the case states it. ``start``: a function from
     rest positions (n, 3) to positions in the first frame, if they differ. ``joints``: bones turn about their axes. ``regions``: by
     name, in which effects act.
     """

@@ -1,4 +1,4 @@
-"""The page ``credibility``: the verification and validation of each quantity, after NIST's fire models and ASME V&V 40."""
+"""The page ``credibility``: evidence for each quantity, as in NIST's study of fire models and in ASME V&V 40."""
 
 import math
 from collections import Counter
@@ -19,7 +19,7 @@ COMMON = (0.0, 57.0)  # flexion of the hip [deg] that every case completes
 GRADES = {
     "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract; no part of the "
     "model is from memory",
-    "indicative": "within the uncertainty of every measurement, but all by one specimen, a quotation, a fit or memory",
+    "indicative": "within the uncertainty of every measurement, but each is from one specimen, a quotation, a fit or memory",
     "outside": "the model differs from a measurement of muscle by more than its uncertainty, or a measured moment arm is not "
     "within the range of the fibres in all poses",
     "verified only": "the equations are solved correctly; no measurement of muscle is compared with it",

@@ -47,7 +47,7 @@ def comparison_text(result: Comparison) -> str:
     judged = [_judged(verdict) for verdict in result.verdicts]
     asked = {verdict.expectation.of for verdict in result.verdicts}
     unjudged = result.candidates and asked == {"reference"}
-    note = ", of the reference; candidates are measured, not judged" if unjudged else ""
+    note = " for the reference; candidates are measured, not judged" if unjudged else ""
     return "\n".join([*runs, *_known(result), *_worst(result), *judged, f"verdict: {result.word}{note}"])
 
 
@@ -99,7 +99,7 @@ def _known(result: Comparison) -> list[str]:
         if bar is not None:
             value = f"{measure.worst.value:.4g} {measure.unit}"
             lines.append(f"  {measure.metric} {measure.statistic}: {value}, {_bar(result, bar)}")
-    lines.append("error bars of deviations from it (the widest):")
+    lines.append("error bars of deviations from the reference (the widest):")
     deviations = [bar for bar in result.error_bars.bars if bar.of == "deviation"]
     lines += [f"  {bar.metric} {bar.statistic}: {_bar(result, bar)}" for bar in deviations]
     return [*lines, *filter(None, [spread(result)])]

@@ -38,9 +38,8 @@ class NodalState:
     = 1), or absent (l = 0).
 
     If an effect depends on velocities, ``before`` (m, k, 3) [mm] is the displacement at the start of the last load step, and
-    ``rate`` [1/s] is 1 over the duration of this step; otherwise they are (0, 0, 3) and 0. For a body in situ, ``response`` (m, k,
-    3) [mm] and ``response_pressure`` (m, l) [MPa] give the stress at rest (``effects.in_situ``); otherwise they are (0, 0, 3) and
-    (0, 0).
+    ``rate`` [1/s] is 1 over its duration; otherwise they are (0, 0, 3) and 0. For a body in situ, ``response`` (m, k, 3) [mm] and
+    ``response_pressure`` (m, l) [MPa] give the stress at rest (``effects.in_situ``); otherwise they are (0, 0, 3) and (0, 0).
     """
 
     displacement: Floats

@@ -1,6 +1,4 @@
-"""Frames and runs of one of several muscles, taken from the frames and runs of all. Scalars of a muscle begin with its name and a
-dot.
-"""
+"""Frames and runs of one of several muscles, from those of all. Names of a muscle's scalars begin with its name and a dot."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fem_reference.effects import Effect, PassiveFibres, Ramped, in_situ
+from fem_reference.effects import Effect, Load, PassiveFibres, Ramped, in_situ
 from fem_reference.effects.contact import Contact, among
 from fem_reference.effects.damping import Damping
 from fem_reference.foundations.errors import InputError
@@ -30,7 +30,17 @@ def check_names(case: MuscleCase) -> None:
     _check_forces(case)
     loads = [(f"effect[{i}].on", getattr(effect, "on", FREE)) for i, effect in enumerate(case.effects)]
     check_used([*attachments, FREE], loads, case.place)
+    _check_loads(case)
     regions.check(case.region, case.effects, attachments, case.place)
+
+
+def _check_loads(case: MuscleCase) -> None:
+    """Check that no load is on an exact attachment, where it would go to the bone and deform nothing."""
+    exact = [attachment.name for attachment in case.attachment if attachment.stiffness is None]
+    for i, effect in enumerate(case.effects):
+        if isinstance(effect, Load) and effect.on in exact:
+            got = f'"{effect.on}", which follows its bone exactly, so that a load on it deforms nothing'
+            raise InputError(join(case.place, f"effect[{i}].on"), got, f'"{FREE}" or an attachment with a stiffness')
 
 
 def _check_forces(case: MuscleCase) -> None:

@@ -82,8 +82,7 @@ class GlobalStep:
 
     ``pick`` (m, n) multiplies both sides: it selects the rows of free vertices or, for least squares, is the transpose of their
     columns. ``coupling`` (m, k): the columns of attached vertices, also multiplied. ``loose``: free vertices that no weights
-    connect to an attached vertex. If there are any, or if nothing or everything is attached, there is no ``factor``: free vertices
-    stay.
+    connect to an attached vertex. If any are, or nothing or everything is attached, there is no ``factor``: free vertices stay.
     """
 
     cells: VertexCells

@@ -42,7 +42,7 @@ class Projections(Record):
 
 
 class ArapPbdSettings(Record):
-    """ARAP with the rows of attached vertices removed and rotations fitted in each iteration; settings that keep its volume.
+    """Settings of ARAP, with the rows of attached vertices removed and rotations fitted in each iteration, and of its volume.
 
     ``weights``, ``iterations`` and ``tolerance``: as in ``arap``; "tutte" is not offered, as with removed rows it gives the states
     of "kirchhoff". ``volume_constraint``: minimise the energy at the rest volume. ``projections``: none by default.

@@ -43,11 +43,11 @@ Value = int | float | str
 
 
 class CommandSettings(Record):
-    """The command, and the value of each setting in it.
+    """The command line, with a value for each setting that it contains.
 
     ``unit``: the unit of length of its frames, by default the unit in a ``candidate.toml`` beside them, otherwise mm. ``version``:
     the version of the program. ``files``: further files and folders that determine its results, besides those in the command.
-    ``moves``: the mesh with its unknowns. ``time_limit``: the limit of processor time. ``directory``: its working directory.
+    ``moves``: the mesh whose points the program moves. ``time_limit``: of processor time. ``directory``: its working directory.
     ``ladder``: useful values of settings, from the fastest to the most accurate.
     """
 

@@ -2,8 +2,7 @@
 
 Listings 4.1, 4.2, 4.4 and 4.5 are transcribed. Vertices are numbered from 0 here and from 1 there. ``bounds`` (2, m) is the
 listings' list of Dirichlet conditions: a row of vertices and a row of values. Lengths have any unit, or none: only the directions
-of the edges of a mesh count. validation/octave has the listings as Octave runs them, their results, and the reading of each
-misprint.
+of the edges of a mesh count. validation/octave has the listings as run, their results, and the reading of each misprint.
 """
 
 import time

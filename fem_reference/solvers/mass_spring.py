@@ -47,14 +47,13 @@ def _damping(text: object) -> float | str:
 
 
 class MassSpringSettings(Record):
-    """Stiffness, mass and time of the muscle.
+    """Stiffness and density of the muscle, and the time of the solver.
 
-    ``stiffness``: the stiffness of every spring. ``density``: the density of the muscle. All masses are equal: equilibrium does not
-    depend on masses, and a small mass would make every time step small. ``frame_time``: the solver's time from a frame number to
-    the next; the longer it is, the nearer the muscle is to equilibrium. The scene's interval applies to the reference and to
-    recorded sequences. ``damping``: the coefficient c, or ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an
-    acceleration, by default none. ``collision``: contact with bones at every step, by default none. ``time_step``: the longest
-    allowed step, by default a stable one.
+    ``stiffness``: of every spring. ``density``: of the muscle. All masses are equal: equilibrium does not depend on masses, and a
+    small mass would make every time step small. ``frame_time``: the solver's time between successive frame numbers; the longer it
+    is, the nearer the muscle is to equilibrium. The scene's interval applies to the reference and to recorded sequences.
+    ``damping``: the coefficient c, or ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an acceleration, by default
+    none. ``collision``: contact with bones at every step, by default none. ``time_step``: the longest, by default a stable one.
     """
 
     stiffness: Stiffness
@@ -165,8 +164,7 @@ class MassSpringModel:
     def frame(self, number: int) -> Frame:
         """Surface and fibres as the masses carry them; attached vertices move with their bones.
 
-        Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and ``inverted_tets``, the number of inverted
-        tetrahedra.
+        Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and the number ``inverted_tets``.
         """
         given, mesh = self.problem, self.problem.mesh
         moved = self.points - mesh.points

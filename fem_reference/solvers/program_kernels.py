@@ -2,20 +2,16 @@
 
 All of it follows the program's source. As the result is chaotic, the last digit counts: each sum has the order that gcc 12 produces
 with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than SSE2), as
-found in the machine code. Do not simplify the sums. Arrays should be writable and C-contiguous: any other kind is compiled
-separately.
+found in the machine code. Do not simplify the sums. Arrays that are not writable and C-contiguous are compiled separately.
 """
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Bools, Floats, Ints
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import Vector, at, cross, dot, minus, move, times
-
-Bools = NDArray[np.bool_]
 
 # Pairs of triangles whose normals have a cosine of greater magnitude than this are left as they are.
 FLAT_COSINE = 1 - 1e-10

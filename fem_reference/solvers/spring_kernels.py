@@ -63,8 +63,7 @@ def forces(points: Floats, network: Network) -> Floats:
 def advance(
     points: Floats, previous: Floats, network: Network, path: PrescribedPath, time_step: float, steps: int
 ) -> None:
-    """Move ``points`` (n, 3) [mm] in place through ``steps`` of ``time_step`` [s]; ``previous`` (n, 3) are the positions a step
-    before.
+    """Move ``points`` (n, 3) [mm] in place through ``steps`` of ``time_step`` [s]; ``previous`` (n, 3): one step before.
 
     Position Verlet with the velocity of the step before, eqs 5.6 and 5.7:
     ``x(t + dt) = 2 x(t) - x(t - dt) + dt^2 / m (F(t) - c (x(t) - x(t - dt)) / dt)``.

@@ -43,7 +43,7 @@ class XpbdCollision(Record):
 class XpbdSettings(Record):
     """The settings of the method and of the muscle; every key is required except the keys that turn an effect on.
 
-    ``frame_time`` [s]: the solver's time from a frame number to the next; the scene's interval is for the reference and recorded
+    ``frame_time`` [s]: the solver's time between successive frame numbers; the scene's interval is for the reference and recorded
     sequences. ``sub_steps``: time steps in a ``frame_time``. ``sweeps``: over all constraints in each time step. ``density``
     [t/mm3]: of the enclosed body; its mass is divided among the vertices in proportion to area.
 

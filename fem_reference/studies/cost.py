@@ -124,9 +124,7 @@ def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
 
 
 def settings_of(trial: Trial) -> dict[str, object]:
-    """The settings of a trial that differ from the solver's defaults (others are left out, even if stated), and the hash of a
-    program.
-    """
+    """Settings of a trial other than the solver's defaults (which are left out even if stated), and the hash of a program."""
     given = trial.choice.settings
     try:
         own = solvers.settings(trial.choice, trial.name)

@@ -110,9 +110,7 @@ def law_of(name: str, case: MuscleCase, poisson: float) -> Effect:
 
 
 def check_law(name: str, poisson: object, place: str) -> None:
-    """InputError at the ``place`` of a solver's keys where the reference has no such law with Lame's parameters, or ``poisson`` is
-    no Poisson's ratio.
-    """
+    """InputError at ``place`` if the reference has no such law with Lame's parameters, or ``poisson`` is no Poisson's ratio."""
     known = [one for one in names(Energy) if {"mu", "lame"} <= find(one).model_fields.keys()]
     if name not in known:
         raise InputError(

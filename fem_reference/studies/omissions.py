@@ -35,9 +35,7 @@ LIMIT, COMPILING = 2.0, 60.0
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A part that is left out of a trial: ``effects`` of its scene, ``features`` of its solver, each by name; with ``support``
-    also the support by contact at rest.
-    """
+    """A part left out of a trial: ``effects`` of its scene, ``features`` of its solver, and ``support`` by contact at rest."""
 
     effects: dict[str, Effect]
     features: tuple[str, ...] = ()

@@ -156,9 +156,7 @@ def _result(
 
 
 def seconds_of(run: Run) -> float | None:
-    """The time [s] per frame number if the solver computes each number or its ``candidate.toml`` states that time, else per wanted
-    frame; None where it is unknown.
-    """
+    """The time [s] per frame number if each is computed or ``candidate.toml`` states it, else per wanted frame; None if unknown."""
     cost = run.outcome.cost
     given = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
     return seconds_per_frame(run) if given is None else given

@@ -28,9 +28,7 @@ FORCE = "force on "
 
 
 def study(case: MuscleCase, store: Path, workers: Workers, runs: int, seed: int = 1) -> Uncertainty:
-    """The bands of a case from this number of ``runs`` of its reference, none where the case itself has no solution; InputError
-    where no parameter has a range.
-    """
+    """Bands of a case from ``runs`` of its reference, none if it has no solution; InputError if no parameter has a range."""
     varied = unknowns(case)
     case, parameters = varied.case.model_copy(update={"expect": ()}), varied.parameters()  # as nothing is to be judged
     points = sampled(len(parameters), runs, seed)

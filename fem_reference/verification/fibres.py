@@ -62,7 +62,7 @@ def free(material: Material) -> Specimen:
 
 
 force, length = partial(force_entry, "fibres"), partial(stretch_entry, 0, "fibres")
-TOE, LINE = (1.25, "into their toe"), (1.6, "beyond their toe")  # the stretch, and its place on the curve
+TOE, LINE = (1.25, "into the toe region"), (1.6, "beyond the toe region")  # stretches on both parts of the curve
 STRONGER = "Peak stress 1 % too high."
 FAMILIES = NEO + two_families(30.0)
 TAUT, TAUTER = taut(NEO + passive(), 1.2), {"material": taut(NEO + passive(), 1.212)}
@@ -103,12 +103,12 @@ ENTRIES = (
     *(
         force(
             f"active_{limb}",
-            f"Active fibres fixed {words}, on the {limb} limb of the force-length curve: force",
+            f"Active fibres held at a stretch of {stretch}, on the {limb} limb of the force-length curve: force",
             muscle(active(), stretch),
             STRONGER,
             material=NEO + active(stress=1.01 * STRESS),
         )
-        for limb, words, stretch in (("ascending", "short", 0.6), ("descending", "long", 1.6))
+        for limb, stretch in (("ascending", 0.6), ("descending", 1.6))
     ),
     length(
         "active_shortening",

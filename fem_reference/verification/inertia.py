@@ -96,9 +96,7 @@ def more(lab: Lab, periods: float, factor: float) -> float:
 
 
 def slow(lab: Lab, factor: float) -> Finding:
-    """The force due to inertia over its limit for slow motion, in a series of pulls that each take twice as long as the last: the
-    error is of order 2 in the speed.
-    """
+    """Inertia force over its limit for slow motion, in pulls each twice as long as the last: an error of order 2 in the speed."""
     ladder = tuple((1 / periods, more(lab, periods, factor)) for periods in (4.0, 8.0, 16.0))
     acceleration = WAY * float(SMOOTH.deriv(2)(0.25)) / (16.0 * PERIOD) ** 2
     known = inertia.pull_of_inertia(DENSITY, LENGTH, 1.0, acceleration)

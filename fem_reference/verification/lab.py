@@ -20,9 +20,11 @@ class FemLab:
         self.session = session
 
     def solve(self, body: Body, element: str, **settings: Any) -> Run:
-        """The states of ``body`` as the reference, FEniCSx, finds them within a time limit."""
+        """The states of ``body`` as the reference, FEniCSx, finds them within a time limit; RuntimeError if its process dies."""
         limited = {"time_limit": _TIME_LIMIT} | settings
         solved = self.session.solve(body, fenicsx.BodySettings(element=element, **limited))
+        if solved.outcome.status == "crashed":
+            raise RuntimeError(solved.outcome.message)
         return second_check.confirmed_body(body, solved)
 
     def second(self, body: Body, element: str, **settings: Any) -> Run:

@@ -23,9 +23,7 @@ UNIFORM, GRADED = 1.0, 0.5  # m of h ~ r^(1 - m); 1: not graded
 
 
 def _side(sign: float, depth: float, grading: float, unit: Floats) -> Floats:
-    """Points (n, 3) [mm] of a half of the block from those of the unit cube, refined towards the rim x = z = 0 where ``grading`` is
-    below 1.
-    """
+    """Points (n, 3) [mm] of half the block from those of the unit cube, finer near the rim x = z = 0 if ``grading`` < 1."""
     x = unit[:, 0] if sign > 0 else 1 - unit[:, 0]
     power = 1 / grading
     return np.column_stack([sign * x**power, depth * unit[:, 1], unit[:, 2] ** power])

@@ -100,9 +100,7 @@ MISTAKES = (
 
 
 def touching_denials(lab: Lab, farther: float = 0.0) -> Finding:
-    """The number of checks that two blocks pressed together fail, after the face of one is moved ``farther`` [mm] into the
-    other.
-    """
+    """The number of checks that two blocks pressed together fail if the face of one is moved ``farther`` [mm] into the other."""
     body = pressed_blocks(BLOCK_STIFFNESS)
     run = lab.solve(body, "P2/P1", first_step=0.5)
     points = run.last.points.copy()

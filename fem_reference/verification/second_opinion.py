@@ -131,9 +131,7 @@ BLOCK_RULES = (
 
 
 class Tolerance(NamedTuple):
-    """The tolerance of an entry and its reason, for a ``residual`` [N, mm3] and rules of degree ``quadrature``, None: each solver's
-    own.
-    """
+    """Tolerance of an entry and its reason; ``residual`` in N and mm3; ``quadrature``: a degree, None for each solver's own."""
 
     within: float
     because: str

@@ -204,14 +204,14 @@ def test_the_terminal_and_the_page_beside_the_file_say_it(tmp_path: Path, capsys
     changes = ["--set", "muscle.tet_size=9 mm", "--set", "attachment[1].stiffness=100 kPa/mm"]
     assert cli.main([*words, *changes, "--to", str(tmp_path / "springs")]) == cli.DONE
     said = capsys.readouterr().err
-    assert 'another model in FEBio: attachment "insertion": springs at the nearest points' in said
+    assert 'FEBio\'s model differs: attachment "insertion": springs at the nearest points' in said
     assert "5.3 and 8.8 % of the force" in said
     readme = (tmp_path / "springs" / "FEBIO.md").read_text()
-    sentences = [line.split("FEBio: ")[1] for line in said.splitlines() if "another model" in line]
+    sentences = [line.split("model differs: ")[1] for line in said.splitlines() if "model differs" in line]
     assert sentences
     assert all(f"- {sentence}\n" in readme for sentence in sentences)
     assert cli.main([*words, "--set", "muscle.tet_size=9 mm", "--to", str(tmp_path / "exact")]) == cli.DONE
-    assert "another model" not in capsys.readouterr().err
+    assert "model differs" not in capsys.readouterr().err
     assert "- no springs at points of the surface" in (tmp_path / "exact" / "FEBIO.md").read_text()
 
 

@@ -20,6 +20,7 @@ from fem_reference.foundations.mesh import (
     tet_qualities,
     tet_volumes,
     triangle_areas,
+    upright,
     vertex_areas,
 )
 
@@ -33,6 +34,9 @@ TURN = Rotation.random(rng=np.random.default_rng(6))
 def test_volume_and_area_of_the_unit_corner() -> None:
     assert_allclose(tet_volumes(CORNER, ONE), [1 / 6])
     assert_allclose(tet_volumes(CORNER, ONE[:, [1, 0, 2, 3]]), [-1 / 6])
+    both = np.concatenate([ONE, ONE[:, [1, 0, 2, 3]]])
+    assert_allclose(tet_volumes(CORNER, upright(CORNER, both)), 1 / 6)
+    assert_array_equal(upright(CORNER, both)[0], ONE[0])
     assert_allclose(np.sort(triangle_areas(CORNER, TET_FACES)), [0.5, 0.5, 0.5, np.sqrt(3) / 2])
 
 

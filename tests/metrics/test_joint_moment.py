@@ -200,7 +200,7 @@ def test_fibres_alone_have_the_arm_of_their_excursion_and_the_whole_muscle_has_n
     pull = np.repeat(volumes / 4, 4) * [law.slope(stretch) for stretch in everywhere[-1]]
     arms = excursion_arms(everywhere, given, numbers[-3:])[-1]
     assert_allclose(pull @ arms, moments["fibre_passive"][-1], rtol=0.01)
-    assert force_arms(run, joint)[-1] > 1.15 * excursion
+    assert force_arms(run, given)[-1] > 1.15 * excursion
     assert moments["fibre_passive"][-1] < 0.85 * moment[-1]
     assert tension > 0.87 * np.linalg.norm(run.force("femur")[-1])
 
@@ -221,11 +221,11 @@ def test_a_case_without_a_joint_has_no_moment() -> None:
     assert measure(run, at_rest(run), replace(context(run), joints=()), ["joint_moment"]) == ()
 
 
-def force_arms(run: Run, joint: Joint) -> Floats:
-    """The arm (f,) [mm] of the force on the bone of a joint, as the metric measures it from rest at every frame."""
-    name = joint.bone.name
-    force = np.linalg.norm(run.force(name), axis=1)
-    return run.moment(name, joint.centre) @ joint.axis / np.where(force > 0, force, np.nan)
+def force_arms(run: Run, given: MeasurementContext) -> Floats:
+    """The arm (f,) [mm] of the force on the bone of a joint, as the metric measures it from rest."""
+    arm = find(measure(run, at_rest(run), given, ["joint_moment"]), "joint_moment", "arm")
+    assert arm is not None
+    return arm.values
 
 
 def test_the_force_arm_of_a_straight_bar_is_its_excursion_arm() -> None:
@@ -239,16 +239,9 @@ def test_the_force_arm_of_a_straight_bar_is_its_excursion_arm() -> None:
         pull = (start - end) / away * (away - 10)  # a law of the length
         pulling = replace(run, scalars=scalars_of(pull, end))
         arms = lines.arms_of(run, lines.context_of(joint, run))[:, fibre]
-        assert_allclose(force_arms(pulling, joint), arms, rtol=1e-3)
+        assert_allclose(force_arms(pulling, lines.context_of(joint, run)), arms, rtol=1e-3)
         off = replace(joint, centre=joint.centre + [0, 1, 0])
-        assert np.abs(force_arms(pulling, off) / arms - 1).max() > 0.01
-
-
-def test_without_a_force_there_is_no_arm() -> None:
-    run = pulled()
-    arms = force_arms(run, context(run).joints[0])
-    assert np.isnan(arms[0])
-    assert_allclose(arms[1:], 32 / 5)
+        assert np.abs(force_arms(pulling, lines.context_of(off, run)) / arms - 1).max() > 0.01
 
 
 @pytest.mark.slow
@@ -267,8 +260,8 @@ def test_a_greater_scene_has_forces_and_moments_to_scale(tmp_path: Path) -> None
         case = workflow.load_case(folder, {"frames.last": 10, "frames.every": 5})
         run = workflow.solve(case, store=folder / "store")
         given = context_of(setup(case), run)
-        moment, force, _ = measure(run, at_rest(run), given, ["joint_moment"])
-        found.append((force_arms(run, given.joints[0])[1:], force.values[1:], moment.values[1:], run.force("lid")[1:]))
+        moment, force, arm = measure(run, at_rest(run), given, ["joint_moment"])
+        found.append((arm.values[1:], force.values[1:], moment.values[1:], run.force("lid")[1:]))
     for less, great, power in zip(*found, (1, 2, 3, 2), strict=True):
         assert np.abs(less).max() > 0.01
         assert_allclose(great, 10**power * less, rtol=1e-6, atol=1e-9 * 10**power)

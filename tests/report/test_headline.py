@@ -76,7 +76,7 @@ def test_a_candidate_that_nobody_judged_says_so_and_its_numbers(words, tmp_path:
 def test_a_doubtful_pass_is_one_word_on_the_page_in_json_and_in_the_terminal(words, tmp_path: Path, capsys) -> None:
     target = tmp_path / "facts.json"
     assert cli.main([*words, "--json", str(target)]) == cli.DONE
-    assert "verdict: doubtful pass, of the reference; candidates are measured" in capsys.readouterr().out
+    assert "verdict: doubtful pass for the reference; candidates are measured" in capsys.readouterr().out
     facts = json.loads(target.read_text())
     assert (facts["verdict"], len(facts["doubts"])) == ("doubtful pass", 3)
     listed = (tmp_path / "out" / "index.html").read_text()

@@ -33,7 +33,7 @@ def test_a_comparison_is_printed_with_its_worst_frames_bars_and_verdict(comparis
     ]
     quick = next(line for line in lines if line.startswith("quick at its worst: "))
     assert "surface deviation max 4 mm (frame 40)" in quick
-    assert lines[-1].startswith("verdict: pass, of the reference; candidates are measured, not judged")
+    assert lines[-1].startswith("verdict: pass for the reference; candidates are measured, not judged")
     assert not any("error bars" in line for line in lines)
     bars = comparison_text(with_bars(comparison)).splitlines()
     assert any(line.startswith("error bars of the reference") for line in bars)

@@ -98,6 +98,12 @@ WRONG = [
         {"name": "tendon", "on": "top", "stiffness": "1 N/mm", "reach": "1 mm"},
         'effect[1].on: got "top", want one of start, end, free',
     ),
+    ("effect[1]", PRESSURE | {"on": "end"}, 'effect[1].on: got "end", which follows its bone exactly'),
+    (
+        "effect[1]",
+        {"name": "membrane", "on": "end", "thickness": "1 mm", "mu": "1 MPa"},
+        'effect[1].on: got "end", which follows its bone exactly',
+    ),
     (
         "effect[0]",
         PRESSURE | {"ramp": [{"frame": 0, "amount": 0.5}]},

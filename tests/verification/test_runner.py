@@ -194,6 +194,15 @@ def test_a_signal_to_the_command_judges_no_entry(number, caplog, monkeypatch) ->
     assert (ended.value.code, measured, caplog.messages) == (130, [], [])
 
 
+def test_entries_that_fail_with_a_number_wait_for_no_signal(monkeypatch) -> None:
+    """Only one without a number may be an end by a signal that has yet to reach this process: 0.5 s each, far above a second."""
+    monkeypatch.setattr(runner.os, "sched_getaffinity", lambda _: set(range(1)))
+    begin = time.perf_counter()
+    found = runner.run([entry(f"off_{i}", 3.0) for i in range(6)], Labs())
+    assert [one.word for one in found] == ["fail"] * 6
+    assert time.perf_counter() - begin < 1.5
+
+
 def test_a_lab_that_cannot_be_made_closes_the_others(monkeypatch) -> None:
     monkeypatch.setattr(runner.os, "sched_getaffinity", lambda _: set(range(2)))
     labs = Labs()

@@ -24,9 +24,7 @@ _PARTS = 16
 
 
 class FrameModel(Protocol):
-    """A model of a muscle that advances from frame number to frame number; the loop adds to its ``cost``, and ends the message of a
-    failed run with its ``advice``.
-    """
+    """A model of a muscle, advanced by frame numbers; the loop adds to its ``cost``. ``advice`` ends messages of failed runs."""
 
     cost: dict[str, float]
     advice: str

@@ -119,7 +119,7 @@ class Hill(Record):
 
 
 class HillSettings(Record):
-    """Lines as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1). ``max_force``: the force of all together.
+    """Lines as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1). ``max_force``: of all lines together.
     ``fibre_share``: the optimal length of the fibres of a line over its length at the first frame, at which its tendon is just
     slack; ``pennation``: the angle of the fibres; ``activation``: from 0 to 1.
     """

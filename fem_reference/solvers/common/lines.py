@@ -22,14 +22,14 @@ _ROUNDING = 1e-9
 
 
 class CurvePoint(Record):
-    """A ``position`` on a bone, in the frame of rest, at an ``angle`` of a joint."""
+    """A ``position`` on a bone, in coordinates of the rest state, at an ``angle`` of a joint."""
 
     angle: Angle
     position: Point
 
 
 class Via(Record):
-    """A point of every fibre that moves with a ``bone``; at rest it is ``at`` this share of the fibre's length.
+    """A point of every fibre that moves with a ``bone``. ``at``: its place at rest, as a share of the fibre's length.
 
     ``within``: the least and the greatest angle of the ``joint`` at which lines pass through the point; at other angles they omit
     it. ``curve``: its positions on the bone by the joint's angle, the same for all fibres. In between, the positions follow
@@ -68,7 +68,7 @@ class Guided:
         return bool(low - _ROUNDING <= self.joint.angle_of(number) <= high + _ROUNDING)
 
     def position(self, number: int) -> Floats:
-        """The point (3,) [mm] of a ``curve`` on its bone, in the frame of rest."""
+        """The point (3,) [mm] of a ``curve`` on its bone, in coordinates of the rest state."""
         angles = [point.angle for point in self.via.curve]
         places = np.array([point.position for point in self.via.curve])
         angle = np.clip(self.joint.angle_of(number), angles[0], angles[-1])

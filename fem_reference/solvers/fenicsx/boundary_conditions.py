@@ -47,9 +47,7 @@ class PrescribedRegion:
         self.wanted.x.array.reshape(-1, 3)[self.nodes] = self.entry.path(ends, frame) - self.extension
 
     def extend(self, response: Floats) -> None:
-        """Extend springs at rest by the ``response`` (n,) of the unknowns: the other end of each spring is moved back by this
-        response.
-        """
+        """Extend springs at rest by the ``response`` (n,) of the unknowns: the other end of each spring is moved back by it."""
         if self.entry.stiffness is not None:
             self.extension = np.where(np.isin(np.arange(3), self.along), response[self.all], 0.0)
             self.wanted.x.array.reshape(-1, 3)[self.nodes] = -self.extension
@@ -92,9 +90,7 @@ class PointSprings:
         self.ends = self.wanted = self.points.rest - self.along * (self.points.positions(response) - self.points.rest)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
-        """Add the spring forces to ``residual`` over this rank's unknowns; advanced to first order by their ``moves`` (n,), if
-        given.
-        """
+        """Add spring forces to ``residual`` over this rank's unknowns, advanced to first order by ``moves`` (n,) if given."""
         now = self.unknowns.x.array
         self.points.add_forces(residual, self._pulls(now if moves is None else now + moves))
 

@@ -12,9 +12,8 @@ from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 
 
 class Patches:
-    """The points of each of p cells. A point moves at most ``spread`` (p,) times as far as the k nodes of its cell; this is the sum
-    of the magnitudes of their basis functions at the point. If these do not give the rest position, a rotation adds at most ``off``
-    (p,) [mm].
+    """The points of each of p cells. A point moves at most ``spread`` (p,) times as far as the k nodes of its cell, the sum of the
+    magnitudes of their basis functions there. If these do not give the rest position, a rotation adds at most ``off`` (p,) [mm].
     """
 
     def __init__(self, points: ContactPoints) -> None:

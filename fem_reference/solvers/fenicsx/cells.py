@@ -77,9 +77,7 @@ class CellSums:
         return Structure(found.indptr.astype(np.int32), found.indices.astype(np.int32))
 
     def places(self, structure: Structure, fixed: NDArray[np.bool_]) -> Places:
-        """The places of each cell's entries (m, u, u) among those of ``structure``; entries of a ``fixed`` (n,) unknown share one
-        place after the last.
-        """
+        """The places of each cell's entries (m, u, u) in ``structure``, one past the last for those of ``fixed`` (n,) unknowns."""
         found = np.empty((*self.unknowns.shape, self.unknowns.shape[1]), np.int32)
         arrays: tuple[NDArray[Any], ...] = self.unknowns, structure.starts, structure.columns, fixed.view(np.int8)
         size = ctypes.c_int(len(structure.columns))

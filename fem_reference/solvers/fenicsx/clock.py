@@ -17,8 +17,7 @@ _INSTANT = 1e-7
 class Clock:
     """Sets the time ``step`` of a form; does nothing for a form without one.
 
-    With inertia a body is at rest up to its first requested frame: it is ``resting`` until its initial acceleration is known, and
-    then moves.
+    With inertia a body rests up to its first requested frame: it is ``resting`` until its initial acceleration is known.
     """
 
     def __init__(self, body: Body, step: TimeStep | None) -> None:

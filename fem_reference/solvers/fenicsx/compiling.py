@@ -134,9 +134,7 @@ def _code(value: Any, points: Any, functions: list[Any], constants: list[Any]) -
 
 
 class _WithoutVariables(MultiFunction):  # type: ignore[misc]  # UFL has no types
-    """Replaces variables of differentiation by their values: UFL numbers them consecutively in a process, so a compiled form would
-    not be found again.
-    """
+    """Replaces variables of differentiation by values: UFL numbers them by process, so a compiled form would not be found again."""
 
     expr = MultiFunction.reuse_if_untouched
 

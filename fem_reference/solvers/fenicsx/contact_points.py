@@ -35,9 +35,7 @@ class ContactPoints:
         return np.asarray(self.rest + carried.shares @ unknowns[carried.dofs])
 
     def add_forces(self, residual: Floats, forces: Floats, some: Ints | None = None) -> None:
-        """Add the weak form of ``forces`` (n, 3) [N] at the points, or at ``some`` of them (n,), to ``residual`` over this rank's
-        unknowns.
-        """
+        """Add the weak form of ``forces`` (n, 3) [N] at (``some`` of) the points to ``residual`` over this rank's unknowns."""
         shares = self.carried.shares if some is None else self.carried.shares[some]
         residual[self.carried.dofs] += shares.T @ forces  # ``dofs`` names each unknown once
 
@@ -86,7 +84,7 @@ def on_facets(displacement: Displacement, mesh: Cells, facets: Ints, degree: int
 
 
 def on_skin(displacement: Displacement, skin: Skin, local: Ints) -> ContactPoints:
-    """The points of a ``skin`` in this rank's own cells; ``local`` (m,): the number here of each cell of the body, else -1."""
+    """The points of a ``skin`` in this rank's own cells; ``local`` (m,): this rank's number of each cell of the body, or -1."""
     mine, msh = np.flatnonzero(local[skin.cells] >= 0), displacement.space.mesh
     cells, points = local[skin.cells[mine]], skin.points[mine]
     within = barycentric(points, msh.geometry.x[msh.geometry.dofmap[cells]])[:, 1:]

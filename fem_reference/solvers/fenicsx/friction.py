@@ -62,9 +62,7 @@ class Friction:
         return Grip(which, -found.stiffness[:, None] * elastic, slope, here - kept[:, None] * elastic, lost)
 
     def _slip(self, which: Ints, here: Floats, gaps: Sampled, before: Before) -> tuple[Floats, Floats]:
-        """The displacement (n, 3) [mm] of the points from the places that hold them, and its derivative (n, 3, 3) in their
-        positions.
-        """
+        """Displacement (n, 3) [mm] of points from the places that hold them, and its derivative (n, 3, 3) in their positions."""
         slip, change = here - self.stuck[which], np.tile(np.eye(3), (len(which), 1, 1))
         new = np.flatnonzero(np.isnan(slip).any(axis=1))
         if len(new):

@@ -59,9 +59,7 @@ class Multigrid:
         return False
 
     def _renew(self) -> None:
-        """Build the preconditioner of the present matrix: first the pressure, from the volume residual; then the displacement, from
-        the remaining forces.
-        """
+        """Build the preconditioner: the pressure from the volume residual, then the displacement from the remaining forces."""
         with self.spent.on("factorisation"):
             kinds: Any = PETSc.PC  # the stubs declare its members as numbers
             blocks = PETSc.PC().create(self.matrix.comm)

@@ -68,9 +68,7 @@ def command_line(ranks: int) -> list[str]:
 
 
 class Process:
-    """A process started by the command ``words``. It reads the names of job files, one per line; its error output is read
-    continuously.
-    """
+    """A process of the command ``words``. It reads names of job files, one per line; its error output is read continuously."""
 
     def __init__(self, words: list[str]) -> None:
         pipe = subprocess.PIPE

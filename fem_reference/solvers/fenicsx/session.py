@@ -21,9 +21,7 @@ from fem_reference.solvers.fenicsx.settings import BodySettings, FieldSettings
 
 
 class Session:
-    """Solves problems on ``ranks`` in a subprocess of its own, which is restarted if it has died; jobs and frames are passed as
-    files in a ``folder``.
-    """
+    """Solves problems on ``ranks`` in a subprocess, restarted if it died; jobs and frames are passed as files in a ``folder``."""
 
     def __init__(self, folder: Path, ranks: int) -> None:
         self.folder, self.ranks = folder.resolve(), ranks  # the process may have another working directory

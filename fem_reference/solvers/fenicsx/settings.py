@@ -47,9 +47,7 @@ class BodySettings(Record):
 
 
 class Settings(BodySettings):
-    """Numerics of a muscle. ``ranks``: MPI processes, by default one, or two if faster and cores are free; they do not change the
-    result.
-    """
+    """Numerics of a muscle. ``ranks``: MPI processes, by default 1, or 2 if faster and cores are free; the result is the same."""
 
     ranks: int | None = Field(default=None, gt=0, le=1024)
 

@@ -28,9 +28,7 @@ State = tuple[Floats, list[tuple[Met, PressedPoints]], list[Rubbed | None], list
 
 
 class TouchingForces:
-    """Contact between the parts of the surface that the ``touching`` of a body names, on one rank. It updates itself where the
-    unknowns have changed.
-    """
+    """Contact between the parts of the surface named by ``touching``, on one rank; updated when the unknowns have changed."""
 
     def __init__(self, body: Body, form: Form, displacement: Displacement, spent: Spent) -> None:
         """ArithmeticError where parts overlap at rest by more than the smoothing."""

@@ -169,18 +169,14 @@ class Pass:
         return some[kept], facets[kept]
 
     def _heights(self, nodes: Floats, points: Floats, some: Ints, facets: Ints) -> tuple[Floats, Floats]:
-        """The heights (n,) [mm] of points over the planes through the middles of their facets, and the most that each facet (m,)
-        may bulge from its plane.
-        """
+        """The heights (n,) [mm] of points above planes through the middles of facets, and each facet's greatest bulge (m,)."""
         middle = self.other.places(nodes, np.arange(len(nodes)), np.full((len(nodes), 2), 1 / 3))
         heights = np.einsum("mki,mi->mk", nodes - middle.point[:, None], middle.normal)
         bulge = np.abs(heights).max(axis=1) * _BULGE
         return np.vecdot(points[some] - middle.point[facets], middle.normal[facets]), bulge
 
     def pressure(self, met: Met) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] of the points that ``met`` the other side, and its slope in the gap; what is left of an overlap
-        at rest is subtracted.
-        """
+        """Pressure (n,) [MPa] of points that ``met`` the other side, less that of overlaps at rest, and its slope in the gap."""
         return self.law.pressure(met.gap + self.share * self.overlaps[met.points])
 
     def let_fall(self, met: Met) -> None:

@@ -103,9 +103,7 @@ class Validity:
         return Trouble("collapsed", why)
 
     def examine(self, frame: float) -> tuple[dict[str, float], list[Outside]]:
-        """The extremes of the means in the present state, at ``frame``; the number ``outside_law`` of cells outside the range of a
-        law; and each such law.
-        """
+        """Extremes of the present means, at ``frame``; the number ``outside_law`` of cells outside a law's range; these laws."""
         scalars: dict[str, float] = {}
         found: list[Outside] = []
         outside = np.zeros(len(self.cells), bool)

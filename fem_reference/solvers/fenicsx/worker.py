@@ -99,9 +99,7 @@ class Worker:
         return result
 
     def solve_exactly(self) -> bool:
-        """Solve linear systems exactly from now on, as an inexact solution would move a nearly free body far away. True if this is
-        a change.
-        """
+        """Solve linear systems exactly from now on, as inexact solutions move a nearly free body far. True if this is a change."""
         other = self.body.linear.solve_exactly()
         self.exact |= other
         return other
@@ -116,9 +114,7 @@ class Worker:
         )
 
     def negative_modes(self, frame: float) -> dict[str, float]:
-        """The number of directions in which the energy falls from the state of a reached frame, if known; its time does not count
-        as solving.
-        """
+        """The number of directions in which the energy falls from a reached frame, if known; not counted as time of solving."""
         begin = time.perf_counter()
         modes = self.body.examine(frame)
         own = self.body.modes_of_material() if modes is not None and modes > 0 else modes

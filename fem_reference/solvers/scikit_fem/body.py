@@ -32,9 +32,9 @@ class ScikitBodySettings(Record):
     """Numerics of a body; steps are in frame numbers.
 
     ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one step to each
-    frame: it grows by half after an easy step (at most 5 Newton iterations) and is halved when Newton needs more than
-    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's iteration ends when the norm of the nodal forces and of
-    the volume equation is at most this. ``quadrature_degree``: the degree of the polynomials that are integrated exactly on a
+    frame: it grows by half after an easy step (at most 5 Newton iterations) and is halved if Newton's method needs more than
+    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal forces and of
+    the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are integrated exactly on a
     straight cell, by default as the element requires.
     """
 

@@ -33,8 +33,8 @@ _ELEMENTS = {
 class Points:
     """Points of integration, q in each of m ``cells`` (m,): their ``places`` (m, q, 3) [mm] and ``weights`` (m, q) [mm3 or mm2],
     the ``values`` (m, q, k) and ``slopes`` (m, q, 3, k) of the k functions of the displacement, the values ``pressures`` (m, q, l)
-    of those of the pressure, and the unknowns ``dofs`` (m, 3 k + l); on facets the outward unit ``normals`` (m, q, 3), and in a
-    body with fibres their directions ``fibre`` (m, q, 3).
+    of the l functions of the pressure, and the unknowns ``dofs`` (m, 3 k + l); on facets the outward unit ``normals`` (m, q, 3),
+    and in a body with fibres their directions ``fibre`` (m, q, 3).
     """
 
     cells: Ints
@@ -116,7 +116,7 @@ class Space:
             _, number = np.unique(np.concatenate([wanted, own]), axis=0, return_inverse=True)
             found.append(facets[np.isin(number[len(wanted) :], number[: len(wanted)])])
         if sum(map(len, found)) != len(wanted):
-            raise InputError(f"facets.{region}", "facets that are not of one cell each", "facets of the surface")
+            raise InputError(f"facets.{region}", "facets of no cell or of two cells", "facets of the surface")
         return np.concatenate(found)
 
     def nodes_on(self, region: str) -> Ints:
