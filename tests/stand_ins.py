@@ -6,6 +6,7 @@ from types import ModuleType
 import pytest
 
 from fem_reference.assessment import second_check
+from fem_reference.assessment.run_checks import RunCheck
 from fem_reference.solvers.common.protocol import MuscleSolver, Solve
 
 
@@ -19,3 +20,9 @@ def solve_by(monkeypatch: pytest.MonkeyPatch, module: ModuleType, solve: Solve) 
 def unchecked(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ask no second check, which has tests of its own: what stands in for the reference leaves its bones."""
     monkeypatch.setattr(second_check, "of_muscle", lambda *_: ())
+
+
+def deny_further_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the second check deny each run but the reference itself."""
+    denied = (RunCheck("det F", 2.0, 1.0, "", 10),)
+    monkeypatch.setattr(second_check, "of_muscle", lambda _, run, __: () if run.name == "reference" else denied)

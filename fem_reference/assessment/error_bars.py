@@ -59,7 +59,8 @@ class ErrorBar:
     over the frames.
 
     ``model`` (f,): the change of the statistic by another model of spring attachments: by exact attachments if these were solved,
-    and for a force or moment at least ``SPREAD`` of its value. This is no error of the present model, so ``values`` leave it out.
+    and for a force or moment at least ``SPREAD`` of its value; NaN where exact attachments could not be solved, None if there are
+    no springs or it was not asked for. This is no error of the present model, so ``values`` leave it out.
     """
 
     of: Of

@@ -30,10 +30,10 @@ def force_bars(pair: Pair, context: MeasurementContext) -> tuple[ErrorBar, ...]:
                 size = _length(kind, bone, *runs)
                 parts[name] = left[name] * typical(size, apart[name], moved if name == TETRAHEDRA else None)
             bar = together(parts, np.ones(len(moved), bool))
-            # The change by springs that are spread in another way.
-            model = SPREAD * _length(kind, bone, pair.fine) if pair.springs else None
-            if model is not None and pair.exact is not None:
-                model = np.fmax(model, _length(kind, bone, pair.exact, pair.coarse))
+            # The changes by springs that are spread in another way, and by exact attachments, of this muscle or of a neighbour.
+            known = [SPREAD * _length(kind, bone, pair.fine)] if pair.springs else []
+            known += [] if pair.exact is None else [_length(kind, bone, pair.exact, pair.coarse)]
+            model = np.fmax.reduce(known) if known else None
             bars.append(ErrorBar("change", f"{kind}_on_bone", bone, unit, *bar, model))
     return tuple(bars)
 

@@ -79,6 +79,12 @@ def _check_file_name(name: str) -> str:
     return name
 
 
+def _check_part_name(name: str) -> str:
+    if "." in _check_file_name(name):
+        raise ValueError("a name without a dot, which follows it in names of scalars")
+    return name
+
+
 def check_once(names: Sequence[str], place: str) -> None:
     """Raise InputError if one of ``names`` occurs twice."""
     twice = next((name for name in names if names.count(name) > 1), None)
@@ -100,6 +106,8 @@ _LONGEST_NAME = 100
 Name = Annotated[str, AfterValidator(check_name)]
 # A name that is also valid for a file or folder.
 FileName = Annotated[str, AfterValidator(_check_file_name)]
+# A name that is valid for a folder and, followed by a dot, begins names of scalars.
+PartName = Annotated[str, AfterValidator(_check_part_name)]
 
 
 def parse[R](record: type[R], table: object, place: str) -> R:

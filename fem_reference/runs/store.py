@@ -258,17 +258,19 @@ def finished(folder: Path, ended: Collection[str] = ("converged",)) -> Run | Non
     return run if run.outcome.status in ended else None
 
 
-def at_numbers(run: Run, values: Floats, numbers: tuple[int, ...]) -> Floats:
-    """The ``values`` (f, ...) of a run at frame ``numbers``, NaN if it has no such frame."""
+def at_numbers(run: Run, values: Floats, numbers: tuple[int, ...], *, trusted: bool = True) -> Floats:
+    """The ``values`` (f, ...) of a run at frame ``numbers``, NaN if it has no such frame or is not ``trusted``."""
     rows, lost = dict(zip(run.numbers, values, strict=True)), np.full(values.shape[1:], np.nan)
-    return np.stack([rows.get(number, lost) for number in numbers])
+    return np.stack([rows.get(number, lost) if trusted else lost for number in numbers])
 
 
-def complete(run: Run, numbers: tuple[int, ...]) -> Run:
-    """The run over exactly the frames ``numbers``; frames that were not reached are NaN, so they never pass."""
-    if run.numbers == numbers:
+def complete(run: Run, numbers: tuple[int, ...], *, trusted: bool = True) -> Run:
+    """The run over exactly the frames ``numbers``; frames that were not reached are NaN, so they never pass. All frames are NaN if
+    the run is not ``trusted``.
+    """
+    if run.numbers == numbers and trusted:
         return run
-    pick = partial(at_numbers, run, numbers=numbers)
+    pick = partial(at_numbers, run, numbers=numbers, trusted=trusted)
     return replace(
         run,
         numbers=numbers,

@@ -10,7 +10,7 @@ from pydantic import Field
 from fem_reference.effects import Effect
 from fem_reference.effects.touching import MuscleContact, among
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.records import Name, join
+from fem_reference.foundations.records import PartName, join
 from fem_reference.scenes.case import Expectation
 from fem_reference.scenes.fibres import Fibres
 from fem_reference.scenes.muscle import Attachment, DrivenCase, Muscle, MuscleCase
@@ -27,7 +27,7 @@ class MuscleOfSeveral(Muscle):
     in this muscle only; ``expect``: its expectations.
     """
 
-    name: Name
+    name: PartName
     attachment: tuple[Attachment, ...] = ()
     region: tuple[CaseRegion, ...] = ()
     fibres: Fibres

@@ -35,12 +35,12 @@ def is_of_body(reference: object, of: object) -> bool:
     return True
 
 
-def check_muscle(name: object, case: Case) -> None:
-    """Raise InputError unless ``name`` is that of one of several muscles of the ``case``, or empty for the case of one."""
-    names = [one.name for one in case.muscle] if isinstance(case, MusclesCase) else [""]
-    if name not in names:
+def check_muscle(name: object, case: object) -> None:
+    """Raise InputError unless ``name`` is that of one of several muscles of the ``case``, or empty for any other case or body."""
+    names = [one.name for one in case.muscle] if isinstance(case, MusclesCase) else []
+    if name not in (names or [""]):
         raise InputError(
-            "muscle", said(name), f"one of {', '.join(names)}" if case.parts else "none, as there is but one"
+            "muscle", said(name), f"one of {', '.join(names)}" if names else "none, as there are not several"
         )
 
 

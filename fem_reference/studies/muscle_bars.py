@@ -1,11 +1,16 @@
 """Error bars of several muscles that are solved together: in each further solution the cause of error is smaller in all muscles."""
 
 import logging
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import cast
+
+import numpy as np
 
 from fem_reference.assessment.error_bars import ErrorBars, Pair
 from fem_reference.problems.joining import called
 from fem_reference.problems.muscles import MusclesProblem
+from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
@@ -47,11 +52,21 @@ def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> dict[st
     for name, part in parts.items():
         refinement.check_coarser(part, *(refinement.tets(one[name], called(name, "tets")) for one in (fine, coarse)))
         size = part.scene.muscle.tet_size / 2**part.scene.muscle.refinements
-        varied = {cause: runs[name] for cause, runs in split.items()}
+        varied = {cause: _parted(runs[name], fine[name], parts) for cause, runs in split.items()}
         safety = _safety(own, parts, name)
         pair = Pair(fine[name], coarse[name], (size, ratio * size), varied, exact.get(name), safety, springs[name])
         bars[name] = refinement.made(pair, part, reference.folder and reference.folder / name, reference)
     return bars
+
+
+def _parted(run: Run, reference: Run, names: Iterable[str]) -> Run:
+    """The ``run`` of a muscle, with no force on any of the ``names`` that it cannot touch but the ``reference`` can: with less
+    smoothing contact acts at shorter distances, and fewer muscles are near enough.
+    """
+    none = 0.0 * run.positions[:, 0, 0]  # NaN in frames that are not known
+    kinds = [f"{kind}_on_{name}" for kind in ("force", "moment") for name in names]
+    keys = {key for kind in kinds for key in vector_scalars(kind, np.zeros(3))}
+    return replace(run, scalars=dict.fromkeys(keys & set(reference.scalars), none) | run.scalars)
 
 
 def _safety(bench: Bench[MusclesCase], parts: dict[str, Bench[MuscleCase]], name: str) -> float:

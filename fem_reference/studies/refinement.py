@@ -23,6 +23,7 @@ from fem_reference.io import files
 from fem_reference.metrics import context_of
 from fem_reference.problems.body import Body
 from fem_reference.problems.finer import finer as on_finer_cells
+from fem_reference.runs import views
 from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import DrivenCase, MuscleCase
@@ -42,7 +43,8 @@ log = logging.getLogger(__name__)
 
 EXACT = "exact attachments"
 # Files, besides the metrics, whose code makes error bars.
-_MAKING = (differences.__file__, error_bars.__file__, force_bars.__file__, __file__)
+_OF_BARS = [str(one.__file__) for one in (differences, error_bars, force_bars, views)]
+MAKING = (*map(Path, _OF_BARS), *map(Path(__file__).with_name, ("muscle_bars.py", "refinement.py", "variations.py")))
 
 # The coarse run of a scene with refined tetrahedra omits the last refinement; that of any other scene has a mesh of its own, with
 # tetrahedra larger by this factor.
@@ -176,9 +178,9 @@ def solutions[C: DrivenCase](
     bench: Bench[C], reference: Run, larger: dict[str, C], ratio: float, *, model: bool
 ) -> dict[str, tuple[Bench[C], Run]]:
     """Benches and runs, by name: of the scene on ``larger`` tetrahedra, of ``ratio`` times the size; of this scene with each other
-    cause of error halved; and, with ``model``, of this scene with exact attachments, where it can be solved.
+    cause of error halved; and, with ``model``, of this scene with exact attachments, NaN if it cannot be set up.
     """
-    (base,) = larger.values()
+    ((first, base),) = larger.items()
     scenes = larger | {name: vary(base) for name, vary in needed(bench, reference).items()}
     if model:
         scenes[EXACT] = exactly_attached(base)
@@ -193,7 +195,8 @@ def solutions[C: DrivenCase](
         except InputError as error:
             if name != EXACT:
                 raise
-            log.info("error bar: without the change by exact attachments: %s", error)
+            log.warning("error bar: the change by exact attachments is not known: %s", error)
+            found[name] = found[first][0], complete(found[first][1], reference.numbers, trusted=False)
     return found
 
 
@@ -226,7 +229,7 @@ def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
 
 
 def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) -> tuple[Bench[C], Run]:
-    """The bench of a changed scene, and the reference's run of it over the frames of ``reference``."""
+    """The bench of a changed scene, and its run over the frames of ``reference``: NaN where not reached, and if it is denied."""
     other = Bench(case, bench.store, bench.ranks)
     try:
         run = other.obtain(f"reference, {name}", without_states(case.reference), "reference")
@@ -235,7 +238,7 @@ def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) 
         raise InputError(f"error bar, {name}", got, "a finer reference") from error
     if run.outcome.status != "converged":
         log.info("error bar: %s: %s, %s", name, run.outcome.status, run.outcome.message)
-    return other, complete(run, reference.numbers)
+    return other, complete(run, reference.numbers, trusted=run.outcome.status != "denied")
 
 
 def _of(reference: Run) -> dict[str, str]:
@@ -248,7 +251,7 @@ def _of(reference: Run) -> dict[str, str]:
 def _measuring_hash() -> str:
     """A hash over the source files by which runs are measured."""
     digest = hashlib.sha256()
-    for path in (*sorted(Path(metrics.__file__).parent.glob("*.py")), *map(Path, _MAKING)):
+    for path in (*sorted(Path(metrics.__file__).parent.glob("*.py")), *MAKING):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 

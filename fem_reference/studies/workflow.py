@@ -110,10 +110,10 @@ def error_bars(
     reference did not converge.
     """
     with reported(progress):
+        arguments.check_muscle(muscle, case)
         if arguments.is_of_body(reference, case):
             return refinement.body_bars(reference)
         scene = arguments.check_case(case)
-        arguments.check_muscle(muscle, scene)
         arguments.check_run(reference, scene, "reference")
         bench = Bench(scene if scene.parts else casefile.muscle(scene), arguments.free_folder(store, "store"))
         return muscle_bars.bars(bench, reference, muscle) if muscle else refinement.bars(bench, reference)

@@ -63,6 +63,8 @@ def test_causes_are_added_as_squares_and_the_model_stays_beside() -> None:
     assert_allclose(bar.model, SPREAD * 5 * TIMES)
     exact = pulled((1.0, 3.0, 4.2), growth=0.12)
     assert_allclose(bars(fine, coarse, springs=True, exact=exact)["force_on_bone", "femur"].model, TIMES)
+    # Exact attachments of its neighbour reach a muscle without springs too.
+    assert_allclose(bars(fine, coarse, exact=exact)["force_on_bone", "femur"].model, TIMES)
 
 
 def test_what_nobody_knows_has_no_bar() -> None:

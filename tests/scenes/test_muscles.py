@@ -106,6 +106,13 @@ def test_mistakes_name_the_muscle(bar: Path, text: str, said: str) -> None:
         casefile.read(written(bar, text))
 
 
+@pytest.mark.parametrize("name", ["/tmp/evil", "../evil", "a/b", "a b", ".a", "a.b", ""])
+def test_the_name_of_a_muscle_is_that_of_a_folder_below_its_run_and_has_no_dot(bar: Path, name: str) -> None:
+    """Scalars of a muscle "a" begin with "a.", as those of "a.b" would."""
+    with pytest.raises(InputError, match=r"muscle\[1\]\.name: got .*, want a name"):
+        casefile.read(written(bar, several(nested("a"), nested(name))))
+
+
 def test_what_is_for_one_muscle_is_refused_for_several(bar: Path) -> None:
     case = casefile.read(written(bar, several(nested("a"), nested("b"))))
     with pytest.raises(InputError, match="a case of several muscles, want the case of a muscle"):

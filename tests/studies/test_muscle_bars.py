@@ -1,6 +1,7 @@
 """Error bars of several muscles by a stand-in for the solver: each has an error of its own and a share of its neighbour's."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,13 @@ import stand_ins
 
 from fem_reference import cli, error_bars, metrics, report, solve
 from fem_reference.assessment import neighbours
+from fem_reference.assessment.error_bars import FILE
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import vertex_areas
 from fem_reference.io import files
+from fem_reference.problems import muscles
 from fem_reference.report import pages
+from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscles import exactly_attached
@@ -49,17 +53,33 @@ def growth(own: float, other: float) -> float:
     return 6e-7 * (own + 0.3 * other)
 
 
+def known(problem, number: float) -> dict[str, float]:
+    """Scalars by the names that the reference gives them: each muscle pulls the floor by 1 N per frame number, and by more the more
+    tetrahedra it has; it presses any that it may touch by 0.1 N, and by more with stiffer contact.
+    """
+    pressed, found = (0.1 + GIVES * problem.law.stiffness) * number, dict[str, float]()
+    counts = {name: len(one.mesh.tets) for name, one in problem.problems.items()}
+    on = {(name, "floor"): (1 + growth(count, 0)) * number for name, count in counts.items()}
+    on |= dict.fromkeys(problem.pairs, pressed) | {pair[::-1]: -pressed for pair in problem.pairs}
+    for (name, other), force in on.items():
+        for kind, size in (("force", force), ("moment", 10 * force)):
+            found |= vector_scalars(f"{name}.{kind}_on_{other}", np.array([size, 0.0, 0.0]))
+    found |= {f"{name}.volume_ratio": 1 - 1e-9 * count * number for name, count in counts.items()}
+    return found | ({"touching_area": 2.0 * number, "touching_pressure": 0.01 * number} if problem.pairs else {})
+
+
 def swell(problem, _settings, sink) -> Outcome:
     """In place of the reference: the points of each muscle move away from the origin."""
     counts = [len(one.mesh.tets) for one in problem.problems.values()]
     give = GIVES * 0.1 / problem.law.stiffness
     grows = [growth(*counts) + give, growth(*counts[::-1]) + give]
     for number in problem.frames:
+        scalars = known(problem, number)
         surface, fibres = problem.rest.surface.points.copy(), problem.rest.fibres.points.copy()
         for span, more in zip(problem.spans, grows, strict=True):
             surface[span.vertices] *= 1 + number * more
             fibres[span.fibres] *= 1 + number * more
-        sink(Frame(number, surface, fibres))
+        sink(Frame(number, surface, fibres, scalars=scalars))
     return Outcome("converged", "done", {"seconds": 1.0})
 
 
@@ -124,6 +144,80 @@ def test_each_muscle_has_bars_of_its_own_pair_with_all_meshes_coarser(two, monke
     for name in ("", "other"):
         with pytest.raises(InputError, match=r"muscle: got str '(other)?', want one of wide, thin"):
             error_bars(case, reference, muscle=name, store=store)
+
+
+@pytest.mark.parametrize("ended", ["denied", "diverged"])
+def test_further_runs_that_the_second_check_denies_or_that_diverge_give_no_bar(two, monkeypatch, ended) -> None:
+    counts = list[int]()
+
+    def fail(problem, settings, sink) -> Outcome:
+        counts.append(len(problem.rest.mesh.tets))
+        if counts[-1] == counts[0]:
+            return swell(problem, settings, sink)
+        swell(problem, settings, lambda frame: None if frame.number else sink(frame))
+        return Outcome("diverged", "no")
+
+    if ended == "denied":
+        stand_ins.deny_further_runs(monkeypatch)
+    else:
+        stand_ins.solve_by(monkeypatch, fenicsx, fail)
+    bench = Bench(casefile.read(two), two / "runs")
+    reference = bench.reference()
+    assert reference.outcome.status == "converged"
+    for found in muscle_bars.obtain(bench, reference).values():
+        assert {bar.metric for bar in found.bars} > {"surface_deviation", "force_on_bone"}
+        assert all(np.isnan(bar.values[1:]).all() for bar in found.bars)
+
+
+def test_bars_are_of_all_muscles_or_of_none_and_of_this_code(two) -> None:
+    bench = Bench(casefile.read(two), two / "runs")
+    reference = bench.reference()
+    assert muscle_bars.stored(bench, reference) == {}
+    muscle_bars.obtain(bench, reference)
+    places = {name: reference.folder / name / FILE for name in SIZES}
+    whole = places["thin"].read_text()
+    places["thin"].unlink()
+    assert muscle_bars.stored(bench, reference) == {}, "one is missing"
+    table = json.loads(whole)
+    places["thin"].write_text(json.dumps(table | {"of": table["of"] | {"metrics": "others"}}))
+    assert muscle_bars.stored(bench, reference) == {}, "one is stale"
+    made = muscle_bars.bars(bench, reference, "thin")
+    assert places["thin"].read_text() == whole
+    assert set(muscle_bars.stored(bench, reference)) == set(SIZES)
+    volume = made.find("change", "volume", "deviation")
+    assert set(volume.parts) > {"tetrahedra", "surface in tetrahedra"}
+    # The muscles do not press each other: no cause of error is contact.
+    apart = replace(reference, scalars=reference.scalars | {"touching_area": np.zeros(len(reference.numbers))})
+    lone = muscle_bars.obtain(bench, apart)["thin"]
+    assert set(lone.find("change", "volume", "deviation").parts) == {"tetrahedra", "surface in tetrahedra"}
+
+
+def test_what_a_muscle_cannot_touch_does_not_make_its_bars_longer(two, monkeypatch) -> None:
+    """The difference of forces on the floor by the closed form of a single value, which is of order 1 on sizes h and 1.5 h."""
+    monkeypatch.setattr(muscles, "_gaps", lambda *_: {("wide", "thin"): 1.0})
+    bench = Bench(casefile.read(two), two / "runs")
+    bars = muscle_bars.obtain(bench, bench.reference())
+    problems = [Bench(one, two).problem().problems for one in (bench.scene, muscle_bars.coarser(bench.scene)[0])]
+    for name, size in SIZES.items():
+        fine, coarse = (growth(len(one[name].mesh.tets), 0) for one in problems)
+        left = 1.25 * 1.2 / 0.5 * max(1.0, size / np.sqrt(AREAS[name] / np.pi))
+        found = bars[name].find("change", "force_on_bone", "floor")
+        assert found.parts["tetrahedra"] == pytest.approx(left * 20 * (fine - coarse), rel=1e-6)
+        assert bars[name].find("change", "force_on_bone", "thin" if name == "wide" else "wide") is None
+
+
+def test_muscles_that_touch_only_by_the_smoothing_that_a_variation_halves_press_by_nothing_there(
+    two, monkeypatch
+) -> None:
+    """The gap of 0.15 mm is below the smoothing, 0.2 mm, and above half of it; the force between the two, 2 N, is all in doubt."""
+    monkeypatch.setattr(muscles, "_gaps", lambda *_: {("wide", "thin"): 0.15})
+    bench = Bench(casefile.read(two), two / "runs")
+    bars = muscle_bars.obtain(bench, bench.reference())
+    for name, other in (("wide", "thin"), ("thin", "wide")):
+        found = bars[name].find("change", "force_on_bone", other)
+        # Twice the difference between the coarse run and that without contact.
+        assert found.parts["contact between muscles smoothing"] == pytest.approx(2 * 20 * (0.1 + GIVES * 0.1))
+        assert np.isfinite(found.values).all()
 
 
 @pytest.mark.parametrize(("own", "wanted", "ratio"), [((0, 1), (0, 1), 1.5), ((1, 2), (0, 1), 2.0)])

@@ -24,6 +24,7 @@ from fem_reference.solvers.common.load_steps import Attempt, StepSizes, march
 from fem_reference.solvers.fenicsx import Settings
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench
+from fem_reference.studies.variations import on_larger
 
 pytestmark = pytest.mark.slow
 
@@ -133,6 +134,13 @@ def test_it_is_kept_with_its_run_until_the_metrics_change_or_the_file_is_damaged
     assert np.array_equal(again, first)
 
 
+def test_bars_are_stale_as_soon_as_code_that_decides_their_numbers_changes() -> None:
+    """The bars of several muscles, the variations and the part of a run for each muscle, beside the bars themselves."""
+    assert all(path.is_file() for path in refinement.MAKING)
+    makers = {"muscle_bars", "refinement", "variations", "views", "error_bars", "force_bars", "differences"}
+    assert {path.stem for path in refinement.MAKING} == makers
+
+
 def test_the_judge_takes_the_bar_on_both_sides_of_the_value(case) -> None:
     path, within = case / "case.toml", "0.5 %"
     verdict = call(case, "run", "--error-bar")[1]["verdicts"][0]
@@ -180,6 +188,13 @@ def test_a_coarser_run_that_fails_leaves_frames_without_a_bar(case, monkeypatch)
     assert (facts["verdict"], facts["verdicts"][0]["error_bar"]) == ("inconclusive", None)
 
 
+def test_further_runs_that_the_second_check_denies_give_no_bar(case, monkeypatch) -> None:
+    stand_ins.deny_further_runs(monkeypatch)
+    _, facts = call(case, "run", "--error-bar")
+    assert {row["value"] for row in facts["error_bars"] if row["frame"] > 0} == {None}
+    assert (facts["verdict"], facts["verdicts"][0]["error_bar"]) == ("inconclusive", None)
+
+
 @pytest.mark.parametrize("changes", [{}, {"attachment[0].stiffness": "100 kPa/mm"}])
 def test_bars_know_whether_an_attachment_is_by_springs(case, monkeypatch, changes) -> None:
     pairs, make = [], error_bars.error_bars
@@ -190,6 +205,19 @@ def test_bars_know_whether_an_attachment_is_by_springs(case, monkeypatch, change
         refinement.obtain(bench, reference, model=model)
     assert [pair.springs for pair in pairs] == [bool(changes)] * 2
     assert [pair.exact is not None for pair in pairs] == [bool(changes), False]
+
+
+def test_a_change_by_exact_attachments_that_cannot_be_solved_is_not_known(case, monkeypatch, caplog) -> None:
+    """A load on what springs attach is such a case: on exact attachments it is refused."""
+    monkeypatch.setattr(refinement, "exactly_attached", lambda one: on_larger(one, 10.0))
+    scene = casefile.read_muscle(case, changes={"attachment[0].stiffness": "100 kPa/mm"})
+    bench = Bench(scene, case.parent / "runs")
+    bars = refinement.obtain(bench, bench.reference())
+    assert "error bar: the change by exact attachments is not known: error bar, exact attachments: got" in caplog.text
+    bar = refinement.stored(bench.reference()).find("change", "surface_deviation", "rms")
+    assert np.isnan(bar.model).all()
+    assert np.isfinite(bar.values).all()
+    assert bars.sizes == (6.0, 9.0)
 
 
 def test_sizes_that_make_no_other_mesh_are_refused(case, monkeypatch) -> None:
