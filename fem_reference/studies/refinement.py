@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference import metrics, solvers
-from fem_reference.assessment import differences, error_bars, force_bars
+from fem_reference.assessment import differences, error_bars, force_bars, second_check
 from fem_reference.assessment.error_bars import SAFETY, BodyBars, ErrorBars, Pair
 from fem_reference.effects import touching
 from fem_reference.effects.contact import among
@@ -272,10 +272,11 @@ def body_bars(solved: Run) -> BodyBars | None:
     assert body is not None
     other, shared, changes, sharper = sharper_problem(body, settings)
     log.info("error bars: solving with %s", sharper)
-    found = fenicsx.solve_body(other, settings.model_copy(update=changes))
+    found = second_check.confirmed_body(other, fenicsx.solve_body(other, settings.model_copy(update=changes)))
     if found.outcome.status != "converged":
         log.info("error bars: with %s: %s, %s", sharper, found.outcome.status, found.outcome.message)
-    bars = error_bars.body_bars(solved.states, found.states, shared, sharper)
+    states = () if found.outcome.status == "denied" else found.states
+    bars = error_bars.body_bars(solved.states, states, shared, sharper)
     log.info("error bars: displacement is known to %.2g %% of itself at the last frame", 100 * bars.displacement[-1])
     return bars
 
@@ -284,8 +285,7 @@ def sharper_problem(
     body: Body, settings: fenicsx.BodySettings
 ) -> tuple[Body, Ints, dict[str, float | str | None], str]:
     """A more accurate problem: its body, the indices in it of the points of ``body``, changed settings, and changes in words."""
-    changes: dict[str, float | str | None] = {"store_state": False}
-    said = ""
+    changes, said = dict[str, float | str | None](store_state=False), ""
     if body.rubs or any(
         "interval" in effect.needs for effect in body.effects
     ):  # in all other cases a state does not depend on load steps

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 import fem_reference as fr
+from fem_reference.assessment import second_check
+from fem_reference.assessment.run_checks import RunCheck
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import refinement
 from tests.assessment.test_body_bars import square_bar
@@ -37,3 +39,11 @@ def test_without_a_quadratic_element_cells_are_halved() -> None:
     assert len(finer.mesh.cells) == 8 * len(square_bar("P2/P1", 1).mesh.cells)
     assert np.allclose(finer.mesh.points[shared], square_bar("P2/P1", 1).mesh.points)
     assert said == "P2/P1 on cells of half the size"
+
+
+def test_a_sharper_solution_that_the_second_check_denies_gives_no_bar(monkeypatch) -> None:
+    body = square_bar("P1/P1", 1)
+    solved = fr.solve_body(body, element="P1/P1")
+    assert np.isfinite(fr.error_bars(body, solved).displacement).all()
+    monkeypatch.setattr(second_check, "of_body", lambda *_: (RunCheck("det F", 2.0, 1.0, "", 1.0),))
+    assert np.isnan(fr.error_bars(body, solved).displacement).all()

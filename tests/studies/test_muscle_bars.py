@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -238,3 +239,14 @@ def test_attachments_and_tetrahedra_of_each_muscle_vary(two) -> None:
     assert (
         refinement.finer(Bench(case, two), solve(casefile.read(two), store=two / "runs"), 0.8).muscle[1].tet_size == 4.0
     )
+
+
+@pytest.mark.nightly  # by day a stand-in for the solver has the bars above
+def test_the_reference_itself_has_bars_of_each_muscle_and_of_the_force_between_them(tmp_path) -> None:
+    """By ``two_muscles`` at its quick size, to half of its motion: the bars of the force between the two are known."""
+    case = casefile.read("two_muscles")
+    bench = Bench(casefile.read("two_muscles", changes=case.quick | {"frames.last": 20}), tmp_path)
+    found = muscle_bars.obtain(bench, bench.reference())
+    bars = [found[name].find("change", "force_on_bone", other) for name, other in permutations(found)]
+    assert all(np.isfinite(bar.values).all() for bar in bars)
+    assert bars[0].values.max() > 0
