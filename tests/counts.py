@@ -208,7 +208,7 @@ ADDED = {
     "a muscle's body beside its measurement, an indentation": 190,
     "time limits in standings, hard cases by programs of other people, laws that cannot be split": 110,
     "anatomy out of downloads": 110,
-    "error bars of several muscles": 180,
+    "error bars of several muscles": 200,
     "contact on attached areas": 20,
     "hard cases of several bodies, paths of pressed points": 170,
     "regions in the export to FEBio, the law corotated": 140,

@@ -169,7 +169,7 @@ def _model(one: Measure, exact: Floats | None, own: Floats | None) -> Floats | N
     forces = one.metric == "joint_moment" and one.statistic != "arm"
     spread = SPREAD * np.abs(own) if forces and own is not None else None
     known = [np.abs(one) for one in (exact, spread) if one is not None]
-    return np.fmax.reduce(known) if known else None
+    return np.maximum.reduce(known) if known else None
 
 
 def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Floats | None = None) -> _Differences:

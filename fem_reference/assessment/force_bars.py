@@ -33,7 +33,7 @@ def force_bars(pair: Pair, context: MeasurementContext) -> tuple[ErrorBar, ...]:
             # The changes by springs that are spread in another way, and by exact attachments, of this muscle or of a neighbour.
             known = [SPREAD * _length(kind, bone, pair.fine)] if pair.springs else []
             known += [] if pair.exact is None else [_length(kind, bone, pair.exact, pair.coarse)]
-            model = np.fmax.reduce(known) if known else None
+            model = np.maximum.reduce(known) if known else None
             bars.append(ErrorBar("change", f"{kind}_on_bone", bone, unit, *bar, model))
     return tuple(bars)
 

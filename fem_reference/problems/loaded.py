@@ -32,9 +32,10 @@ def _exact(body: Body) -> list[tuple[Prescribed, Ints]]:
 
 
 def _places(body: Body) -> Iterator[Floats]:
-    """The points (n, 3) [mm] at rest, then at each frame, moved by exact prescribed displacements alone, which may tilt facets."""
+    """The points (n, 3) [mm] at rest, then at and between frames, moved by exact prescribed displacements, which may tilt them."""
     yield body.mesh.points
-    for frame in body.frames[1:]:
+    ends = np.unique([*body.frames, *body.stops])
+    for frame in np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]):
         moved = body.mesh.points.copy()
         for entry, facets in _exact(body):
             corners, axes = np.unique(facets), list(entry.components)

@@ -22,7 +22,8 @@ class Touching:
     coefficient of Coulomb's law, as in ``ContactLaw``; None without friction. ``relaxed``: two frame numbers over which an overlap
     at rest is removed, as with bones. If None, an overlap of two parts presses at once, and an overlap of a part with itself only
     after it has opened. ``around``: True where points of either part also feel the skin around the other, such as that of
-    attachments, which has no points of its own; otherwise a point that slides past the other's rim ends the run.
+    attachments; otherwise a point that slides past the other's rim ends the run. That skin has no points of its own. So contact
+    there is half as stiff: the mean traction is half the reported pressure, and half the area counts.
     """
 
     one: str
@@ -84,15 +85,20 @@ def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[st
             raise InputError(
                 "start", f'places, and "{law.one}" that touches itself', "none: such contact begins at rest"
             )
-    _check_pairs(touching, facets)
+    _check_pairs(touching, facets, piece)
 
 
-def _check_pairs(touching: Sequence[Touching], facets: Mapping[str, Ints]) -> None:
-    """Raise InputError if a pair of facets is under two laws, whose pressures would add up."""
+def _check_pairs(touching: Sequence[Touching], facets: Mapping[str, Ints], piece: Ints) -> None:
+    """Raise InputError if a pair of facets, also of skin around a part, is under two laws, whose pressures would add up. ``piece``
+    (n,): the number of the piece of the mesh to which each point belongs.
+    """
     names = {name for law in touching for name in (law.one, law.other)}
     own = {name: set(map(tuple, np.sort(facets[name], axis=1).tolist())) for name in names}
     for (i, law), (j, other) in combinations(enumerate(touching), 2):
         for one, two in ((other.one, other.other), (other.other, other.one)):
-            if own[law.one] & own[one] and own[law.other] & own[two]:
+            sides = (law.one, one), (law.other, two)
+            shared = [bool(own[a] & own[b]) for a, b in sides]
+            pieces = [len(np.intersect1d(piece[facets[a]], piece[facets[b]])) for a, b in sides]
+            if all(shared) or (law.around and other.around and all(pieces) and any(shared)):
                 got = f'"{other.one}" and "{other.other}" with facets that touch under touching[{i}], too'
                 raise InputError(f"touching[{j}]", got, "one law for a pair of facets")

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference import metrics, solvers
-from fem_reference.assessment import differences, error_bars, force_bars, second_check
+from fem_reference.assessment import differences, error_bars, force_bars, neighbours, run_checks, second_check
 from fem_reference.assessment.error_bars import SAFETY, BodyBars, ErrorBars, Pair
 from fem_reference.effects import touching
 from fem_reference.effects.contact import among
@@ -42,8 +42,10 @@ from fem_reference.studies.variations import (
 log = logging.getLogger(__name__)
 
 EXACT = "exact attachments"
-# Files, besides the metrics, whose code makes error bars.
-_OF_BARS = [str(one.__file__) for one in (differences, error_bars, force_bars, views)]
+# Files, besides the metrics, whose code makes error bars, or denies the runs that they come from.
+_OF_BARS = [
+    str(one.__file__) for one in (differences, error_bars, force_bars, views, second_check, run_checks, neighbours)
+]
 MAKING = (*map(Path, _OF_BARS), *map(Path(__file__).with_name, ("muscle_bars.py", "refinement.py", "variations.py")))
 
 # The coarse run of a scene with refined tetrahedra omits the last refinement; that of any other scene has a mesh of its own, with

@@ -20,10 +20,10 @@ class FemLab:
         self.session = session
 
     def solve(self, body: Body, element: str, **settings: Any) -> Run:
-        """The states of ``body`` as the reference, FEniCSx, finds them within a time limit; RuntimeError if its process dies."""
+        """The states of ``body`` as the reference, FEniCSx, finds them within a time limit; RuntimeError if it is ended."""
         limited = {"time_limit": _TIME_LIMIT} | settings
         solved = self.session.solve(body, fenicsx.BodySettings(element=element, **limited))
-        if solved.outcome.status == "crashed":
+        if solved.outcome.status in ("crashed", "timed out", "stalled"):
             raise RuntimeError(solved.outcome.message)
         return second_check.confirmed_body(body, solved)
 

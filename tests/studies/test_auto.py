@@ -130,7 +130,7 @@ def test_an_effect_that_turns_out_to_matter_is_added(tmp_path, monkeypatch, capl
         patch.setattr(estimates, "_near", blind)
         bench = Bench(scene, tmp_path / "runs")
     assert [effect.title for effect in bench.scene.effects] == ["NeoHooke", "Incompressible"]
-    with caplog.at_level("INFO"):
+    with caplog.at_level("INFO", logger="fem_reference"):
         run = bench.obtain("reference", scene.reference, "reference")
     assert solved == [["NeoHooke", "Incompressible"], ["NeoHooke", "Incompressible", "Contact"]]
     assert reached == [0, 5, *run.numbers]  # it was stopped where it met the ball

@@ -138,6 +138,7 @@ def test_bars_are_stale_as_soon_as_code_that_decides_their_numbers_changes() -> 
     """The bars of several muscles, the variations and the part of a run for each muscle, beside the bars themselves."""
     assert all(path.is_file() for path in refinement.MAKING)
     makers = {"muscle_bars", "refinement", "variations", "views", "error_bars", "force_bars", "differences"}
+    makers |= {"second_check", "run_checks", "neighbours"}
     assert {path.stem for path in refinement.MAKING} == makers
 
 
@@ -217,6 +218,7 @@ def test_a_change_by_exact_attachments_that_cannot_be_solved_is_not_known(case, 
     bar = refinement.stored(bench.reference()).find("change", "surface_deviation", "rms")
     assert np.isnan(bar.model).all()
     assert np.isfinite(bar.values).all()
+    assert all(np.isnan(one.model).all() for one in bars.bars if one.metric == "force_on_bone")
     assert bars.sizes == (6.0, 9.0)
 
 

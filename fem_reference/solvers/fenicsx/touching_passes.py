@@ -122,7 +122,8 @@ class Pass:
         found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt])
         depth, nearest = np.abs(found.gap), np.full(len(points), np.inf)
         np.minimum.at(nearest, found.points[faces], depth[faces])
-        beyond[felt[held[felt] & (depth <= nearest[found.points] + most)]] = -1.0
+        far = depth > nearest[found.points] + most
+        beyond[felt[far]], beyond[felt[held[felt] & ~far]] = np.inf, -1.0
         order = np.lexsort((depth, beyond[felt], found.points))
         order = order[faces[order]]
         return found.some(order[np.unique(found.points[order], return_index=True)[1]])

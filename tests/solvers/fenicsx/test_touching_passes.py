@@ -198,6 +198,26 @@ def test_a_point_stays_on_its_facet_unless_another_is_nearer_by_more_than_the_sm
     assert met.gap == pytest.approx(-(0.1 - np.where(stays, right, -right)) / np.sqrt(2), abs=1e-14)
 
 
+@pytest.mark.parametrize("held", [True, False])
+@pytest.mark.parametrize("element", ["P2/P1", "Q1/P0"])
+def test_a_nearer_facet_just_beyond_its_edge_comes_before_a_deeper_one(element, held) -> None:
+    """The ridge of the test above, whose left side is skewed beside its end, so that some points are just beyond its edge. They
+    begin in contact with the right side, if ``held``, or without contact.
+    """
+    contact, upper = over_a_block(element)
+    unknowns, one = contact.unknowns.x.array, contact.passes[1]
+    x, y = one.other.rest[..., 0], one.other.rest[..., 1]
+    unknowns[one.other.dofs[..., 2]] = -np.abs(x - 0.5)
+    unknowns[one.other.dofs[..., 1]] = 0.2 * np.maximum(0.5 - x, 0) * (1 - y)
+    for away in (0.03, -0.02)[not held :]:
+        unknowns[upper] = [away, -0.3, -1.1]
+        contact.look()
+    met = contact.now[1][0]
+    assert len(met.points) == len(one.areas)
+    left = (0.1 + one.places(contact.seen)[met.points, 0] - 0.5) / np.sqrt(2)
+    assert (-met.gap - left).max() <= 0.02
+
+
 def lost(element: str, x: tuple[float, float], z: tuple[float, float], sag: float = 0.0) -> np.ndarray:
     """True for each point of the lower face of a plate that went through in a load step, in which the middle of the face goes
     along ``x`` and ``z``, over a block of which both halves sag by ``sag``.
