@@ -27,6 +27,15 @@ def test_the_pressure_is_that_of_bones() -> None:
     assert slope[:5] == pytest.approx([0, 0, -1, -2, -2], abs=1e-15)
 
 
+def test_skin_around_parts_is_under_one_law() -> None:
+    """The sides of the lower box are around both its top and its bottom: two laws would press there with twice the pressure."""
+    around = replace(LAW, around=True)
+    with pytest.raises(fr.InputError, match="want one law for a pair of facets"):
+        check(body(around, replace(around, one="low_z0")), "P1")
+    check(body(LAW, replace(LAW, one="low_z0")), "P1")
+    check(body(around, replace(around, one="low_z0", other="high_z1")), "P1")
+
+
 @pytest.mark.parametrize(
     ("law", "message"),
     [
