@@ -138,9 +138,7 @@ def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | N
 
 
 def stored(reference: Run, muscle: str = "") -> ErrorBars | None:
-    """The error bars stored beside a reference run, those of one ``muscle`` of several in its folder; None where there are none, or
-    they are of another run or of other metrics.
-    """
+    """The error bars stored beside a reference run, of one ``muscle`` of several; None if there are none of this run and metrics."""
     if reference.folder is None:
         return None
     folder = reference.folder / muscle
@@ -288,9 +286,8 @@ def sharper_problem(
 ) -> tuple[Body, Ints, dict[str, float | str | None], str]:
     """A more accurate problem: its body, the indices in it of the points of ``body``, changed settings, and changes in words."""
     changes, said = dict[str, float | str | None](store_state=False), ""
-    if body.rubs or any(
-        "interval" in effect.needs for effect in body.effects
-    ):  # in all other cases a state does not depend on load steps
+    # In all other cases a state does not depend on load steps.
+    if body.rubs or any("interval" in effect.needs for effect in body.effects):
         largest = min(settings.largest_step or np.inf, float(np.diff(body.frames).max(initial=settings.first_step)))
         changes |= {"first_step": settings.first_step / 2, "largest_step": largest / 2}
         said = " and load steps of half the length"
