@@ -138,7 +138,7 @@ def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | N
 
 
 def stored(reference: Run, muscle: str = "") -> ErrorBars | None:
-    """The error bars stored beside a reference run, of one ``muscle`` of several; None if there are none of this run and metrics."""
+    """The error bars stored beside a reference run, of one ``muscle`` of several; None if none are of this run and metrics."""
     if reference.folder is None:
         return None
     folder = reference.folder / muscle
