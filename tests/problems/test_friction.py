@@ -10,10 +10,10 @@ STEP = 1e-6
 
 
 def test_a_spring_pulls_up_to_the_limit() -> None:
-    slip = np.array([0.0, 0.1, 0.2, 0.5])
-    found = returned(slip, np.full(4, 0.4), 2.0)
-    assert found.stiffness * slip == pytest.approx([0, 0.2, 0.4, 0.4], abs=1e-15)
-    assert returned(slip, np.zeros(4), 2.0).stiffness * slip == pytest.approx(np.zeros(4), abs=1e-15)
+    slip = np.array([0.0, 0.1, 0.2, 0.201, 0.5])
+    found = returned(slip, np.full(5, 0.4), 2.0)
+    assert found.stiffness * slip == pytest.approx([0, 0.2, 0.4, 0.4, 0.4], abs=1e-15)
+    assert returned(slip, np.zeros(5), 2.0).stiffness * slip == pytest.approx(np.zeros(5), abs=1e-15)
 
 
 def test_derivatives_are_those_of_the_values() -> None:
