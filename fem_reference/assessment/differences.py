@@ -10,9 +10,7 @@ from fem_reference.runs.store import Run
 
 # Prefixes of statistics that are the value at one place, each with the prefix of the average over places.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
-_LEAST = (
-    0.5  # averages of changes differ by at least this share of the distance of the runs: a smaller difference is chance
-)
+_LEAST = 0.5  # averages of changes differ by at least this share of the distance between the runs: a smaller difference is chance
 _MOVED = 0.01  # below this share of a surface's greatest motion, ratios to the motion have no meaning
 
 
@@ -59,8 +57,8 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
 
     By the triangle inequality, changes of the same places differ by at most their deviation. They differ by less, as most of the
     deviation is not along the displacement, or cancels. A single statistic does not show by how much less: its difference may be
-    small by chance, most of all at the worst place. A quantile or a greatest value belongs to one place, wherever it is: nothing
-    cancels there, and no quantile of the deviation bounds it. So its difference counts as at least the rms distance of places.
+    small by chance, especially at the worst place. A quantile or a greatest value belongs to one place, wherever it is: nothing
+    cancels there, and no quantile of the deviation bounds it. So its difference counts as at least the rms distance over places.
     """
     metrics = [metric for metric, _ in names]
     shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]

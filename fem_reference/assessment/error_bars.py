@@ -60,7 +60,7 @@ class ErrorBar:
 
     ``model`` (f,): the change of the statistic by another model of spring attachments: by exact attachments if these were solved,
     and for a force or moment at least ``SPREAD`` of its value; NaN where exact attachments could not be solved, None if there are
-    no springs or it was not asked for. This is no error of the present model, so ``values`` leave it out.
+    no springs or no other model was solved. This is no error of the present model, so it is not part of ``values``.
     """
 
     of: Of
@@ -79,8 +79,8 @@ class ErrorBar:
 
 @dataclass(frozen=True, eq=False)
 class ErrorBars:
-    """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of two ``sizes`` [mm], those of the reference
-    first, with a general ``order`` assumed for the error in the size.
+    """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of two ``sizes`` [mm], the size of the
+    reference first, with a general ``order`` assumed for the error in the size.
     """
 
     numbers: tuple[int, ...]

@@ -14,7 +14,7 @@ from fem_reference.problems.cubes import FREE, CubeState, loaded
 Material = tuple[Effect, ...]
 SQUEEZED, STRETCHED = 0.9, 1.1
 _CLEAR = 0.01  # the share by which the stiffness in a direction must differ to count as softer or stiffer
-# That of the case hip_flexion, after Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
+# The volume law of the case hip_flexion, after Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 VOLUME = make("incompressible_penalty", bulk="10 MPa")
 FIBRES = {"stress": 0.3, "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
 SHIPPED: Material = (make("neo_hooke", mu=0.01), VOLUME, make("fibre_passive", **FIBRES))
@@ -24,7 +24,7 @@ SHIPPED: Material = (make("neo_hooke", mu=0.01), VOLUME, make("fibre_passive", *
 class Quantity:
     """A measured quantity of a cube: its ``truth`` in ``unit`` from ``facts`` of an ``experiment``, its uncertainty ``within`` and
     the reason for it (``because``); ``of``: its value for a material. ``limit``: the reason why the shipped law cannot reach the
-    truth. ``is_order``: True for an order, which is met (1) or not (0), to a half.
+    truth. ``is_order``: True for an order of stiffness, whose value is 1 if it is met and 0 if not, within 0.5.
     """
 
     name: str

@@ -79,7 +79,9 @@ class Judgement:
             return "the baseline has no limit for the distance from the reference; --update adds it, now that there is an error bar"
         known = "the reference" if self.question == "within" else "the baseline"
         text = f"{known} has an error bar of {self.known:.4g} {self.unit}"
-        return f"{text}, and {self.away:.4g} {self.unit} is within it of the {self.allowed:.4g} {self.unit} allowed"
+        return (
+            f"{text}, and {self.away:.4g} {self.unit} differs from the allowed {self.allowed:.4g} {self.unit} by less"
+        )
 
 
 @dataclass(frozen=True)
@@ -177,7 +179,7 @@ def _notes(baseline: Baseline, current: CurrentMeasures, found: list[Judgement])
     if baseline.fem_reference != __version__:
         yield f"measured by fem_reference {__version__}, the baseline by {baseline.fem_reference}"
     if baseline.reference != current.reference_name:
-        yield f"the reference is {current.reference_name}, that of the baseline was {baseline.reference}"
+        yield f"the reference is {current.reference_name}, but the reference of the baseline was {baseline.reference}"
     changed = any(one.word == "fail" and one.question == "unchanged" for one in found if one.name != MOVED)
     if changed and all(one.word == "pass" for one in found if one.name == MOVED):
         yield (

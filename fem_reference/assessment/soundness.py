@@ -1,4 +1,4 @@
-"""Reasons why the frames of a candidate are no answer, although every number is finite; such a candidate is not ranked."""
+"""Reasons why the frames of a candidate are unusable, although every number is finite; such a candidate is not ranked."""
 
 import numpy as np
 
@@ -18,13 +18,13 @@ _STILL, _MOVES = 1e-6, 1e-2
 
 
 def unsound(run: Run, reference: Run) -> str:
-    """The first reason why the frames of a ``run`` are no answer, with its frame; else empty; also empty for a run without the
+    """The first reason why the frames of a ``run`` are unusable, with its frame; empty if there is none, and for a run without the
     reference's surface. Only frames that both runs reached count.
     """
     if not run.has_surface or run.positions.shape != reference.positions.shape:
         return ""  # a run of lines, or of another surface
     if run.outcome.status == "converged" and not np.isfinite(run.positions).all(axis=(1, 2)).any():
-        return "unknown: no frame without values that are not numbers"
+        return "unknown: every frame has values that are not numbers"
     both = np.isfinite(run.positions + reference.positions).all(axis=(1, 2))
     for i in np.flatnonzero(both):
         if why := _of_frame(run, run.positions[i], reference.positions[i]):

@@ -73,7 +73,7 @@ def test_a_run_that_says_it_converged_without_a_frame_is_no_answer() -> None:
 def test_lines_without_a_surface_are_an_answer() -> None:
     lines = replace(run(MOVED[1]), has_surface=False, positions=np.full_like(MOVED, NAN))
     assert unsound(lines, TRUTH) == ""
-    assert unsound(replace(lines, has_surface=True), TRUTH) == "unknown: no frame without values that are not numbers"
+    assert unsound(replace(lines, has_surface=True), TRUTH) == "unknown: every frame has values that are not numbers"
 
 
 def test_it_is_not_ranked_and_named_on_the_page(tmp_path, monkeypatch) -> None:
