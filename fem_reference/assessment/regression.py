@@ -79,9 +79,7 @@ class Judgement:
             return "the baseline has no limit for the distance from the reference; --update adds it, now that there is an error bar"
         known = "the reference" if self.question == "within" else "the baseline"
         text = f"{known} has an error bar of {self.known:.4g} {self.unit}"
-        return (
-            f"{text}, and {self.away:.4g} {self.unit} differs from the allowed {self.allowed:.4g} {self.unit} by less"
-        )
+        return f"{text}; {self.away:.4g} {self.unit} differs from the allowed {self.allowed:.4g} {self.unit} by less"
 
 
 @dataclass(frozen=True)
