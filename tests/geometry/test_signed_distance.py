@@ -211,7 +211,7 @@ def test_triangles_may_have_any_orientation(ball: Grid) -> None:
 
 
 def test_what_bounds_no_body() -> None:
-    with pytest.raises(InputError, match=r"edges of one triangle only, .* want a closed surface"):
+    with pytest.raises(InputError, match=r"edges that belong to only one triangle, .* want a closed surface"):
         build(Surface(BALL.points, BALL.triangles[1:], "ball"), 1.0, 4.0)
     with pytest.raises(InputError, match="ball: got a triangle with a vertex that does not exist"):
         build(Surface(BALL.points[1:], BALL.triangles, "ball"), 1.0, 4.0)
