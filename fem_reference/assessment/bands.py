@@ -63,7 +63,7 @@ def of_values(band: Band, design: Design, values: Floats) -> Band:
 
 def of_field(band: Band, design: Design, products: Floats) -> Band:
     """The ``band`` of the root mean square of a field over its weights, from the ``products`` (f, n, n) of the weighted fields of
-    each pair of runs in each frame. The surrogate describes the field by its principal components, as the distance has a kink at 0.
+    each pair of runs in each frame. The surrogate describes the field by its principal components, as the root has a kink at 0.
     """
     if refused := design.refused or _not_numbers(products):
         return replace(band, refused=refused)

@@ -193,7 +193,7 @@ def limits(one: Measure, bars: Floats) -> tuple[float, float | None]:
     """The tolerance for a change of a statistic and its greatest distance from the reference (None if not known) in a new baseline,
     from the error bars (f,) of a deviation.
 
-    Tolerance: the greatest bar, as a smaller change is no change of accuracy, but at most ``SHARE`` of the greatest value, as
+    Tolerance: the greatest bar, as smaller changes do not matter, but at most ``SHARE`` of the greatest value, as
     stored values are exact even if the reference is uncertain. Distance: the greatest sum of a value and its bar; for a measure of
     the run itself, which has no bar, the greatest value plus its tolerance.
     """

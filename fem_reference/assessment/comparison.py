@@ -84,9 +84,8 @@ class Comparison:
             for it in [one.worst]
             for known in ["" if it.error_bar is None else f"± {it.error_bar:.2g} {it.unit}"]
         ]
-        return table(
-            f"{self.scene.name}: {self.word}", ("candidate", "measure", "greatest", "error bar", "frame"), rows
-        )
+        heads = ("candidate", "measure", "greatest deviation", "error bar", "frame")
+        return table(f"{self.scene.name}: {self.word}", heads, rows)
 
     @property
     def rankings(self) -> tuple[Ranking, ...]:
@@ -172,7 +171,7 @@ def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
 
 
 def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:
-    """True if the expected measure is among ``measures``; a run without a surface lacks many."""
+    """True if the expected measure is among ``measures``; a run without a surface lacks many measures."""
     return find(measures, expectation.metric, str(expectation.statistic)) is not None
 
 

@@ -100,7 +100,7 @@ class Row:
 
     @property
     def models(self) -> tuple[int, int]:
-        """The number of other models within their tolerance, and of all other models, which are no evidence about muscles."""
+        """The number of other models within their tolerance, and of all other models, which are not evidence about muscles."""
         return count(self.beside, "model")
 
     @property
@@ -171,7 +171,7 @@ def of_result(found: Result) -> Beside:
 
 
 def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> str:
-    """The least reliable text in which ``facts`` were read, with notes: a tolerance of ours, a part of the model from memory."""
+    """The least reliable text in which ``facts`` were read, and notes on a tolerance chosen here and a model from memory."""
     read = max((one.read_in for one in facts), key=_READ.index, default="not known")
     chosen = not is_order and not (facts and all(one.sd for one in facts))
     remembered = from_memory and all(one.doi_confirmed == "yes" for one in facts)

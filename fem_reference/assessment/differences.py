@@ -29,8 +29,8 @@ def ratio(differences: Floats, scale: Floats) -> float:
 
 def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> Floats:
     """The size (f,) of signed ``differences`` (f,) of a statistic between two runs whose surfaces are ``apart`` (f,) [mm]: at least
-    the distance times the average ratio of difference to distance over the frames. A difference that crosses zero is no evidence of
-    a small error in that frame. If the surfaces are equal the size is 0.
+    the distance times the average ratio of difference to distance over the frames. A difference that crosses zero does not
+    show that the error is small in that frame. If the surfaces are equal, the size is 0.
 
     If the motion ``moved`` (f,) [mm] of the surfaces is given, the distance counts as at least the motion times the median ratio
     of distance to motion: in some poses two meshes agree better by chance.

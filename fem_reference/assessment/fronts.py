@@ -71,7 +71,7 @@ class Point:
 
     @property
     def load(self) -> float:
-        """The share of the machine that other processes kept busy during its run; NaN if that is not known."""
+        """The share of the machine that other processes kept busy during its run; NaN if it is unknown."""
         return self.costs.get(LOAD, math.nan)
 
     def at(self, error: str, cost: str) -> tuple[float, float] | None:
@@ -107,7 +107,7 @@ class Price:
 
     @property
     def is_measured(self) -> bool:
-        """True if the errors of the front span a factor of two, so that :attr:`factor` is no extrapolation."""
+        """True if the errors of the front span a factor of two, so that :attr:`factor` is not extrapolated."""
         return self.worst >= 2 * self.best
 
 

@@ -49,7 +49,7 @@ class Omission:
 
 @dataclass(frozen=True)
 class Ablation:
-    """Runs ``name`` by ``solver``: the complete one (``whole``), and one for each of ``omissions``; ``kept``: never left out."""
+    """Runs ``name`` by ``solver``: the complete run (``whole``), and a run for each of ``omissions``; ``kept``: never omitted."""
 
     name: str
     solver: str

@@ -55,12 +55,12 @@ class RunCheck:
 
     @property
     def met(self) -> bool:
-        """True if the value is allowed; never for a value that is not a number."""
+        """True if the value is allowed; False for a value that is not a number."""
         return self.value <= self.allowed
 
     @property
     def share(self) -> float:
-        """The value over the allowed one; infinite where either is not a number, or the value is above an allowed 0."""
+        """The value over the allowed value; infinite if either is not a number, or the value is above an allowed 0."""
         return math.inf if math.isnan(share := self.value / (self.allowed or 1e-300)) else share
 
     def __str__(self) -> str:

@@ -108,7 +108,7 @@ class Band:
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A candidate and a band: its ``values`` (f,), and by frame its ``places``, empty without a band or an expected value."""
+    """A candidate in a band: by frame, its ``values``, its ``places`` (empty where none is expected), its distance ``beyond``."""
 
     candidate: str
     quantity: str
@@ -160,7 +160,7 @@ class Uncertainty:
 
 def place(candidate: str, band: Band, values: Floats) -> Placed:
     """A candidate's ``values`` (f,) compared with a band: inside or outside by more than the error bar of the reference, else
-    undecided; also undecided without a bar. A value that is not finite is no answer.
+    undecided; also undecided without a bar. A value that is not finite has "no answer".
     """
     bar = np.full(len(values), math.nan) if band.bar is None else band.bar
     above, below = band.high - values, math.inf if band.distance else values - band.low
