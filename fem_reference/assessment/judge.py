@@ -95,8 +95,8 @@ def doubts(reference: Run) -> list[str]:
     if (np.abs(gaps) > ENERGY_GAP).any():
         most = int(np.argmax(np.abs(gaps)))
         said.append(
-            f"{100 * gaps[most]:.3g} % of the energy without work at frame {reference.numbers[most]}: the body jumped, or the load "
-            "steps are too large to decide (largest_step)"
+            f"the energy changed by {100 * gaps[most]:.3g} % without work at frame {reference.numbers[most]}: the body jumped, or "
+            "the load steps are too large to decide (largest_step)"
         )
     return said
 

@@ -37,7 +37,7 @@ def _of_frame(run: Run, mine: Floats, truth: Floats) -> str:
     triangles, size = run.surface.triangles, diagonal(run.surface.points)
     away = float(np.linalg.norm(mine - truth, axis=1).max())
     if not away <= _FARTHEST * size:
-        return f"exploded: a vertex is {away:.3g} mm from the reference, the body {size:.3g} mm long"
+        return f"exploded: a vertex of a body of {size:.3g} mm is {away:.3g} mm from the reference"
     share = enclosed_volume(mine, triangles) / enclosed_volume(truth, triangles)
     if not _LEAST <= share <= _MOST:
         return f"{'exploded' if share > 1 else 'collapsed'}: {share:.3g} times the volume of the reference"
@@ -56,4 +56,5 @@ def _stuck(mine: Floats, truth: Floats) -> str:
     stuck = (moved < _STILL) & (wanted > _MOVES)
     if not stuck.any():
         return ""
-    return f"stuck: {stuck.sum()} vertices never move, by up to {wanted[stuck].max() * size:.3g} mm in the reference"
+    most = wanted[stuck].max() * size
+    return f"stuck: {stuck.sum()} vertices never move, but by up to {most:.3g} mm in the reference"

@@ -211,7 +211,7 @@ def unturned(options: argparse.Namespace, word: str) -> list[str]:
     if not options.negative_control or word == "fail":
         return []
     why = "its change is not judged here (compare judges candidates too), or is too small"
-    return [f"negative control: the verdict is {word} and should be fail: {why}"]
+    return [f"negative control: the verdict is {word} but should be fail: {why}"]
 
 
 def status(results: Iterable[Comparison]) -> int:

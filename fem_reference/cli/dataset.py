@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     left = found["left_out"]
     assert isinstance(left, dict)
     facts = {key: found[key] for key in ("scenes", "frames", "left_out", "left_out_share")}
-    lines = [f"{options.folder}: {found['scenes']} scenes, {found['frames']} frames; load.py in it reads them"]
+    lines = [f"{options.folder}: {found['scenes']} scenes, {found['frames']} frames; load.py in this folder reads them"]
     lines += [f"left out: {name}: {why}" for name, why in left.items()]
     write_output({"folder": str(options.folder), **facts}, "\n".join(lines), options)
     return DONE

@@ -10,7 +10,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.units import LENGTH_UNITS
 from fem_reference.studies import new_scene
 
-HELP = "write a scene to start from: a copy of a case, or one of your own muscle and bones"
+HELP = "write a scene to start from: a copy of a case, or a scene of your own muscle and bones"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""The verb ``standings``: our solvers, other people's programs and submitted frames over cases, on one page."""
+"""The verb ``standings``: shipped solvers, external programs and submitted frames on several cases, on one page."""
 
 import argparse
 from pathlib import Path
@@ -14,7 +14,7 @@ from fem_reference.report.asked import Asked
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import standings
 
-HELP = "write the page of standings: our solvers and other people's, over cases; unchanged rows are not measured again"
+HELP = "write the page of standings of shipped and external solvers on several cases; measure only new and changed rows"
 PAGE = "standings"
 
 

@@ -7,7 +7,7 @@ from fem_reference.foundations.units import PositivePressure
 
 
 class SquaredInvariants(Energy):
-    """``mu/2 (I1 - 3)^2 + lame/2 (J - 1)^2``.
+    """``mu/2 (I1 - 3)^2 + lame/2 (J - 1)^2``: the two squared constraints of a tetrahedron in XPBD.
 
     ``mu``, ``lame``: stiffness of the two terms [MPa]. They are not Lame's parameters: at rest the shear modulus is 0, and the bulk
     modulus is ``lame + 4 mu``. Source: Newton 1.8.0, newton/_src/solvers/xpbd/kernels.py, ``solve_tetrahedra``, whose compliances

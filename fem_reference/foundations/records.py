@@ -100,7 +100,7 @@ def check_used(known: Sequence[str], uses: Sequence[tuple[str, str]], place: str
             raise InputError(join(place, key), f'"{name}"', want)
 
 
-_SHOWN = 12  # errors of one file
+_SHOWN = 12  # the greatest number of errors that are shown for a file
 _LONGEST_NAME = 100
 # A name in pages and messages.
 Name = Annotated[str, AfterValidator(check_name)]
@@ -130,7 +130,7 @@ def _own(errors: Sequence[Any]) -> list[Any]:
 
 
 def together(wrong: Sequence[InputError]) -> InputError:
-    """One error for all that are ``wrong``, at most one for each key, at the place of the first."""
+    """One error that lists all errors ``wrong``, at most one for each key, at the place of the first."""
     places = {str(one.place): one for one in reversed(wrong)}
     first, *others = sorted(places.values(), key=wrong.index)
     if not others:
@@ -141,7 +141,7 @@ def together(wrong: Sequence[InputError]) -> InputError:
 
 
 def _turned(value: Any, kind: type[Sequence[Any]], into: Callable[[Iterator[Any]], Any]) -> Any:
-    """A ``value`` of a file with all sequences of a ``kind``, lists of files or tuples of records, turned ``into`` the other."""
+    """A ``value`` of a file with all sequences of a ``kind`` (lists of files or tuples of records) converted by ``into``."""
     if isinstance(value, dict):
         return {key: _turned(inside, kind, into) for key, inside in value.items()}
     return into(_turned(inside, kind, into) for inside in value) if isinstance(value, kind) else value

@@ -234,7 +234,7 @@ def test_stated_bars_are_those_of_the_page_of_error_bars() -> None:
     assert f"the mean stress along the fibres is {value} ± {bar} kPa" in " ".join(said.split())
     assert f"`{where}`" in said
     assert {bar for name, bar in stated.items() if name not in (*columns, "Stress")} == {
-        "by --error-bar, by case",
+        "measured by --error-bar for each case",
         "none: cubes are homogeneous",
     }
 

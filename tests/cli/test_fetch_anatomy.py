@@ -29,7 +29,7 @@ def test_what_is_missing_and_what_can_be_solved_is_said(given: Path, tmp_path: P
         f"{to}: 1 of 4 files found, by their content",
         "missing files that are published in this form: box/b",
         "missing files that were cleaned, converted or computed, not published: 2 in hip",
-        "cases that can be solved with it: none",
+        "cases that can be solved with them: none",
         "licence: for no trade",
         f"export FEM_REFERENCE_DATA='{to}'",
     ]
