@@ -131,7 +131,7 @@ class _Frames(NamedTuple):
 def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
     """Judge whether the sampled vertices are unchanged, by the greatest distance [mm] of each frame."""
     was = positions.points(len(current.rest), "baseline")
-    with np.errstate(over="ignore"):  # squares of huge distances, which count as infinite
+    with np.errstate(over="ignore"):  # squares of huge distances overflow and count as infinite
         away = np.linalg.norm(current.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
     still = np.where(np.isnan(was).any(axis=(1, 2)), np.nan, 0.0)
     frames = _Frames(still, away, still, np.full(len(away), POSITION_ROUNDING))
