@@ -71,7 +71,7 @@ def contours(field: FibreField, count: int, towards: Floats | None = None) -> Co
     levels = np.quantile(means, (np.arange(count) + 0.5) / count)
     sections = tuple(one for level in levels if (one := cross_section(field.mesh, field.values, level)) is not None)
     if len(sections) < 2:
-        raise InputError(f"{PLACE}.contours", f"{len(sections)} sections in one piece without holes", "two at least")
+        raise InputError(f"{PLACE}.contours", f"{len(sections)} sections in one piece without holes", "at least two")
     moments = [one.moments for one in sections]
     ends = [field.mesh.points[facets].mean(axis=(0, 1)) for facets in (field.start, field.end)]
     centres = np.array([ends[0], *(centre for centre, _ in moments), ends[1]])
@@ -86,13 +86,13 @@ def contours(field: FibreField, count: int, towards: Floats | None = None) -> Co
 
 
 def _first(middle: CrossSection, product: Floats, towards: Floats | None) -> Floats:
-    """The unit vector (3,) in the ``middle`` section along ``towards``, or the longest axis, its largest component positive."""
+    """The unit vector (3,) in the ``middle`` section along ``towards``, or along the longest axis (largest component positive)."""
     if towards is None:
         longest = np.linalg.eigh(product)[1][:, 2]
         towards = longest * np.sign(longest[np.argmax(np.abs(longest))])
     flat = towards - (towards @ middle.normal) * middle.normal
     if np.linalg.norm(flat) < 1e-6 * np.linalg.norm(towards):
-        raise InputError(f"{PLACE}.towards", "a direction along the muscle", "one across it")
+        raise InputError(f"{PLACE}.towards", "a direction along the muscle", "a direction across the muscle")
     return np.asarray(flat / np.linalg.norm(flat))
 
 
@@ -134,8 +134,8 @@ def _samples(ends: Floats, heights: Floats) -> Floats:
 
 
 def _smooth(line: Floats) -> Floats:
-    """The line (40, 3) with each point on the parabola nearest to it and six neighbours; the ends stay."""
-    from scipy.signal import savgol_filter  # the import takes half a second, with scipy.stats
+    """The line (40, 3) with each point on the parabola that best fits it and its six neighbours; the ends stay."""
+    from scipy.signal import savgol_filter  # imported here, as it loads scipy.stats, which takes half a second
 
     found = savgol_filter(line, _WINDOW, 2, axis=0, mode="interp")
     found[[0, -1]] = line[[0, -1]]

@@ -19,7 +19,7 @@ _BESIDE = 0.05
 _ROUNDS, _STEPS = 6, 8
 # The least and the greatest radius, relative to the edge of a cube of the same volume.
 _RADII = (0.02, 2.0)
-# The most steps of Newton's method, and its tolerance: the longest step over the least radius.
+# The most steps of Newton's method, and its tolerance: the longest step divided by the least radius.
 _PROJECTIONS, _THERE = 12, 1e-9
 
 
@@ -56,8 +56,8 @@ class GaussianSurface:
 
 def fit(surface: Surface, count: int) -> GaussianSurface:
     """The surface of ``count`` Gaussians nearest to a closed ``surface``: nonlinear least squares of distances at vertices and at
-    points on both sides of them, robust against outliers. Deterministic; the fit of a rotated or scaled surface is the rotated or
-    scaled fit, up to rounding, if its principal axes are distinct.
+    points on both sides of them, robust against outliers. The fit is deterministic. A rotated or scaled surface gives the
+    rotated or scaled fit, up to rounding, if its principal axes are distinct.
     """
     if count < 2:
         raise InputError("gaussians", count, "two or more")

@@ -43,9 +43,9 @@ _ROUNDS, _SHORTER = 12, 0.6
 def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) -> TetMesh:
     """The mesh with each tetrahedron cut into eight, and each facet of a region into four.
 
-    Edges that begin at the rims of the regions ``rims`` of ``mesh.facets`` are cut at a quarter, all others in the middle. All
-    boundary points then move onto ``surface``, and from there along their normals to keep the enclosed volume, as far as
-    tetrahedra stay valid; if ``surface`` is None they stay where they are.
+    Edges that begin at the rims of the regions ``rims`` of ``mesh.facets`` are cut at a quarter of their length, all others in the
+    middle. All boundary points then move onto ``surface``, and from there along their normals to keep the enclosed volume, as far
+    as tetrahedra stay valid. If ``surface`` is None, the points stay where they are.
     """
     ends, of_tets, middles = _cut(mesh, _on_rims(mesh, rims))
     points = np.concatenate([mesh.points, middles])

@@ -20,8 +20,8 @@ _FLAT = np.repeat([0, 1 / 3], 3)
 
 @dataclass(frozen=True, eq=False)
 class Displaced:
-    """A ``mesh``, straight at rest, whose nodes are displaced ``by`` (k, 10, 3) [mm] and have a ``velocity`` (k, 10, 3) [mm/s]:
-    corners of each tet, then the middles of its ``EDGES``; None if these are unknown. A
+    """A ``mesh``, straight at rest, whose nodes are displaced ``by`` (k, 10, 3) [mm] and have a ``velocity`` (k, 10, 3) [mm/s],
+    None if unknown. The nodes of a tet are its corners, then the midpoints of its ``EDGES``. This class is a
     :class:`fem_reference.foundations.loads.Shape`.
     """
 
@@ -69,7 +69,7 @@ class Displaced:
         return sizes @ np.einsum("q,kqi->ki", _BULK, self.velocity), sizes @ moments
 
     def _facets(self, on: str) -> tuple[Ints, Ints]:
-        """The tet (m,) of each facet of a region, and the facet's nodes (m, 6) in it: corners, outward, and middles."""
+        """The tet (m,) of each facet of a region, and the facet's nodes (m, 6) in this tet: outward corners, then midpoints."""
         size = len(self.mesh.points)
         found, wanted = (
             (ends[:, 0] * size + ends[:, 1]) * size + ends[:, 2]

@@ -1,4 +1,4 @@
-"""Closed triangulated surfaces of bones of closed form, for pictures and for code that needs the surface of a bone.
+"""Closed triangulated surfaces of bones of simple shapes, for pictures and for code that needs the surface of a bone.
 
 Their vertices lie on the body. A ball, a capsule and a box are built in one way: from the octants of a sphere, moved apart.
 """
@@ -16,10 +16,10 @@ _REACH, _THICKNESS = 1.5, 0.1
 
 
 def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -> Surface:
-    """The closed outward surface of a body of closed form, with ``turn`` sides per full turn; errors name ``place``.
+    """The closed outward surface of a body of simple shape, with ``turn`` sides per full turn; errors name ``place``.
 
-    A half-space extends past the points ``beside`` (n, 3) [mm]: as it is infinite, it is represented by a slab, of which
-    only the vertices in the plane lie on the body.
+    A half-space, which is infinite, is represented by a slab that extends past the points ``beside`` (n, 3) [mm]; only its
+    vertices in the plane lie on the body.
     """
     match solid:
         case HalfSpace():
@@ -38,7 +38,7 @@ def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -
         case Cylinder():
             points, triangles = _prism(solid, turn)
         case _:
-            raise TypeError(f"{type(solid).__name__} is not a body of closed form")
+            raise TypeError(f"{type(solid).__name__} is not a body of a simple shape")
     return Surface(points, triangles, place)
 
 

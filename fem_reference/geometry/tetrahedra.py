@@ -51,7 +51,7 @@ def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] |
 
     A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface without
     self-intersections and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so that it moves with
-    the surface. If gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (its issue 72).
+    the surface. If gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (see its issue 72).
     """
     origin, axes = _own_frame(surface.points)
     local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
@@ -105,7 +105,7 @@ def _mesh(surface: Surface, size: float, shares: Mapping[str, Floats]) -> TetMes
             return replace(mesh, facets=_labelled(mesh, coarse, labels, list(shares)))
         except InputError as error:
             reason = str(error)
-    log.warning("%s: meshed by fTetWild, differently each time, as gmsh cannot: %s", surface.place, reason)
+    log.warning("%s: meshed by fTetWild, anew each time, as gmsh failed: %s", surface.place, reason)
     return checked(run("tetwild", surface, size), surface)
 
 
@@ -133,7 +133,7 @@ def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> t
                 coarse, labels = with_rims(coarse, surface, rims, size)
             if len(self_intersections(coarse)) == 0:
                 if shares and not rims:
-                    crossing = "without the rims of attachments, which would pass through the surface"
+                    crossing = "meshed without the rims of attachments, which would pass through the surface"
                     log.warning("%s: %s", surface.place, crossing)
                 return _near(coarse, surface, size), labels
     return _near(coarse, surface, size), labels
@@ -171,7 +171,7 @@ def run(mesher: str, surface: Surface, size: float) -> TetMesh:
         if no_room := next((words for words in map(os.strerror, NO_ROOM) if words in done.stderr), None):
             raise OSError(f"{folder}: cannot be written: {no_room}; tetrahedra of {surface.place} need room there")
         if done.returncode != 0 or not result.exists():
-            raise InputError(surface.place, f"a surface that {mesher} refuses ({last_words(done)})", "a clean surface")
+            raise InputError(surface.place, f"a surface that {mesher} rejects ({last_words(done)})", "a clean surface")
         with np.load(result, allow_pickle=False) as arrays:
             return TetMesh(arrays["points"], arrays["tets"], maker=_MAKERS[mesher])
 
@@ -198,7 +198,7 @@ def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
         raise InputError(surface.place, "a tetrahedron of zero volume from the mesher", "a cleaner surface")
     got, wanted = np.abs(volumes).sum(), enclosed_volume(surface.points, surface.triangles)
     if not abs(got - wanted) <= _VOLUME_WITHIN * wanted:
-        volumes_got = f"tetrahedra of {got:.0f} mm3 in a surface of {wanted:.0f} mm3"
+        volumes_got = f"tetrahedra of {got:.0f} mm3 in a surface that encloses {wanted:.0f} mm3"
         raise InputError(surface.place, volumes_got, "one clean body")
     return TetMesh(points, upright(points, tets), maker=mesh.maker)
 

@@ -146,7 +146,7 @@ def _across(vectors: Floats, axes: Floats) -> Floats:
 
 
 def _perpendicular(normals: Floats, arms: Floats) -> Floats:
-    """``normals`` (n, 3) scaled to length 1; for a normal that is only rounding, some direction perpendicular to its arm."""
+    """``normals`` (n, 3) scaled to length 1; for a normal that is only round-off, some direction perpendicular to its arm."""
     sizes = np.linalg.norm(normals, axis=1)[:, None]
     squares = np.sum(arms**2, axis=1)[:, None]
     spare = np.cross(arms, np.eye(3)[np.argmin(np.abs(arms), axis=1)])
