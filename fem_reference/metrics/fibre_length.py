@@ -30,7 +30,7 @@ STATISTICS = {
     "max_percent": _of_lines("%", _TITLE, "worst fibre", shown={"table": 30, "claim": 60}, lone=True),
 }
 OF, AGAINST = "lines", "reference"
-# Fibre points within this distance [mm] of points of the measurement context are the same, read in single precision.
+# Fibre points within this distance [mm] of points of the measurement context count as the same points in single precision.
 _SAME = 1e-3
 # The same for a run of lines alone: a reference begins up to this far from the rest state if overlaps with bones were removed.
 _RELAXED = 5.0

@@ -35,11 +35,11 @@ STATISTICS = {
     ),
 }
 OF, AGAINST = "lines", "reference"
-_LEAST = 1e-6  # a force below this share of the greatest one is round-off and has no arm
+_LEAST = 1e-6  # a force below this share of the greatest force is round-off and has no arm
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Differences of ``moment`` [N mm], ``force`` [N], ``arm`` [mm]: NaN if no joint turns alone; the arm also without force."""
+    """Differences of ``moment`` [N mm], ``force`` [N], ``arm`` [mm]; NaN if no joint turns alone (the arm also without force)."""
     joints = [joint for joint in context.joints if _has_force(run, joint)]
     # The rest state of a run, which has no force, is the standard for its change from rest.
     if not joints or not (reference.solver == "rest" or all(_has_force(reference, joint) for joint in joints)):
@@ -58,8 +58,8 @@ def _has_force(run: Run, joint: Joint) -> bool:
 def _values(run: Run, joint: Joint) -> Floats:
     """Moment, force and arm by frame (3, f).
 
-    The arm of a muscle that is a line between two bones, around obstacles on these too, is ``-dl/dtheta``; that of any other, by
-    virtual work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
+    For a muscle that is a line between two bones, or around obstacles on these bones, the arm is ``-dl/dtheta``. For any other
+    muscle it is, by virtual work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
     """
     moment = run.moment(joint.bone.name, joint.centre) @ joint.axis
     force = np.linalg.norm(run.force(joint.bone.name), axis=1)

@@ -80,7 +80,7 @@ class _Arrays:
         self.header = np.dtype(f"{self.order}u{8 if root.get('header_type') == 'UInt64' else 4}")
         self.compressor = root.get("compressor")
         if self.compressor and self.compressor not in _UNPACKING:
-            raise ValueError(f"arrays compressed by {self.compressor[:40]}, none of {', '.join(_UNPACKING)}")
+            raise ValueError(f"arrays compressed by {self.compressor[:40]}, which is none of {', '.join(_UNPACKING)}")
         attributes, _, self.appended = appended.partition(b"_")
         self.encoded = b"base64" in attributes
 
@@ -94,7 +94,7 @@ class _Arrays:
         if form == "appended":
             offset = int(array.attrib["offset"])
             if not 0 <= offset <= len(self.appended):
-                raise ValueError(f"an array at {offset} of {len(self.appended)} bytes")
+                raise ValueError(f"an array at byte {offset} of {len(self.appended)}")
             data, encoded = memoryview(self.appended)[offset:], self.encoded
         else:
             data, encoded = memoryview("".join(text.split()).encode("ascii")), True
@@ -126,7 +126,7 @@ class _Arrays:
 
 def _taken(data: memoryview, count: int) -> bytes:
     if count > len(data):
-        raise ValueError(f"{len(data)} bytes of {count}")
+        raise ValueError(f"{len(data)} bytes instead of {count}")
     return bytes(data[:count])
 
 
@@ -152,10 +152,10 @@ _UNPACKING: dict[str, Callable[[bytes, int], bytes]] = {
 
 
 def _numbers(text: str, dtype: np.dtype[Any]) -> Any:
-    """The numbers of a text; ValueError if a word is not a number."""
+    """The numbers in a text; ValueError if a word is not a number."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
         try:
             return np.fromstring(text, dtype, sep=" ")
         except DeprecationWarning as error:
-            raise ValueError("a word that is no number") from error
+            raise ValueError("a word that is not a number") from error
