@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 
-# Cells of the search grid along the longest edge of the common region of two sets.
+# The number of cells of the search grid along the longest edge of the common region of two sets.
 _CELLS = 16
 
 

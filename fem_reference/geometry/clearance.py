@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats
 
 # Weights that give the four Bernstein coefficients of a cubic (rows) from the four B-spline coefficients of its cell.
 _BERNSTEIN = np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6
-_CHUNK = 20_000  # cells per chunk
+_CHUNK = 20_000  # the number of cells per chunk
 
 
 @dataclass(frozen=True, eq=False)

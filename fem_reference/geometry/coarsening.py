@@ -8,7 +8,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volum
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.edges import Edges
 
-# Chosen by trials on four hip muscles and a box; more rounds improve nothing.
+# Chosen by trials on four hip muscles and a box; more rounds bring no improvement.
 _ROUNDS = 6
 # A vertex may move along a direction if that direction has less than this share of the squared normals around the vertex:
 # the vertex then stays on its plane or sharp edge. Above 0.05 a thin rim shrinks; below 0.02 slivers remain.
@@ -136,7 +136,7 @@ def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
 
 
 def _flip_gain(points: Floats, edges: Edges) -> Floats:
-    """The excess (e,) [rad] over pi of the sum of the angles opposite to each edge; 0 if a flip gains nothing or bends."""
+    """The excess (e,) [rad] over pi of the sum of the angles opposite to each edge; 0 if a flip is not useful or bends it."""
     a, b, c, d = (points[corner] for corner in (*edges.ends.T, *edges.opposite.T))
     excess = _angle(a - c, b - c) + _angle(a - d, b - d) - np.pi
     before = _cosine(np.cross(b - a, c - a), np.cross(a - b, d - b))

@@ -16,14 +16,14 @@ _NUDGE = 1e-4
 # The unit square's boundary, counter-clockwise from the middle of its side x = 1, by shares of its length.
 _SHARES = (0, 1 / 8, 3 / 8, 5 / 8, 7 / 8, 1)
 _SQUARE = ((1, 1, 0, 0, 1, 1), (0.5, 1, 1, 0, 0, 0.5))
-_SAMPLES = 360  # points on each rim that are matched
-_REACH = 60  # samples by which a match may deviate from the common shift of the rim, either way
-_STEPS = (-1, 0, 1, 2, 3)  # samples by which consecutive matches may differ, so that matches stay in order
+_SAMPLES = 360  # the number of points on each rim that are matched
+_REACH = 60  # the number of samples by which a match may deviate from the common shift of the rim, either way
+_STEPS = (-1, 0, 1, 2, 3)  # numbers of samples by which consecutive matches may differ, so that matches stay in order
 _STIFFNESS = (
     0.01  # share of a rim's length: the distance of points that costs as much as stretching a rim to twice its length
 )
-_WINDOW = 9  # samples in the moving mean that smooths the matches
-_LEAST = 0.1  # weight of the common shift in a match, so that no two points coincide
+_WINDOW = 9  # the number of samples in the moving mean that smooths the matches
+_LEAST = 0.1  # the weight of the common shift in a match, so that no two points coincide
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,8 @@
 """Curves through a few points: the estimation techniques of the report's sections 3.1 to 3.5, for fibres and outlines.
 
 A curve is a callable from parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two formulas of the report
-have misprints: the second row of the Bezier matrix (3.1) is -3, 3, 0, 0; and (3.2) is the matrix of the uniform spline, not of the
-centripetal spline: the exponent of its knots and the tension of (3.3) are different parameters.
+have misprints. The second row of the Bezier matrix (3.1) must be -3, 3, 0, 0. The matrix (3.2) belongs to the uniform spline, not
+to the centripetal spline: the exponent of the knots and the tension of (3.3) are different parameters.
 """
 
 from collections.abc import Callable

@@ -93,8 +93,8 @@ def flattened(surface: Surface, place: Floats) -> float:
 
 @np.errstate(over="ignore", invalid="ignore")
 def outer_windings(surface: Surface) -> Floats:
-    """The winding number (m,) of the surface at a point just outside each triangle: 0 on the skin of a valid body, positive inside
-    another part of the body, negative if the triangle faces a part that is inside out; NaN if a triangle has no normal.
+    """The winding number (m,) of the surface at a point just outside each triangle. It is 0 on the skin of a valid body,
+    positive inside another part of the body, negative if the triangle faces a part that is inside out, NaN without a normal.
 
     "Just outside" is 1e-5 of the surface's diagonal away; thinner folds are not distinguished. The winding numbers of Barill et
     al. 2018, doi 10.1145/3197517.3201337, differ by a few thousandths from the whole numbers to which they are rounded.
@@ -112,7 +112,7 @@ def outer_windings(surface: Surface) -> Floats:
 
 def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
     """A lower bound on the greatest depth [mm] of the centroids of the triangles ``some`` (m,) within another part of the closed
-    ``surface``: the distance of a centroid to the nearest opposing triangle in front of it. 0 without self-intersection.
+    ``surface``. The depth is the distance of a centroid to the nearest opposing triangle in front; 0 without self-intersection.
     """
     corners = surface.points[surface.triangles]
     middles, across, covered = corners.mean(axis=1), normals(corners), outer_windings(surface) > 0.5

@@ -18,15 +18,15 @@ from fem_reference.geometry.fibres import POINTS, FibreField, resample
 from fem_reference.geometry.radial_basis import halton
 
 PLACE = "fibres.kohout_kukacka"
-_WINDOW = 7  # points of a line through which smoothing fits a parabola
+_WINDOW = 7  # the number of points of a line through which smoothing fits a parabola
 _FLAT = 1e-9  # twice the area of a triangle in the unit square below which its corners count as collinear
-_SHORTEST = 0.1  # least length of a pennate fibre, as a share of the extent of the longest fibre along the muscle
+_SHORTEST = 0.1  # the least length of a pennate fibre, as a share of the extent of the longest fibre along the muscle
 
 
 @dataclass(frozen=True, eq=False)
 class Contours:
-    """``sections`` of a muscle from one attachment to the other, the positions of their points in the unit ``squares``, and their
-    ``heights`` (k,) between 0 and 1 along the line through their centres, whose length is ``length`` [mm].
+    """Sections of a muscle from one attachment to the other. ``squares``: the positions of their points in the unit square;
+    ``heights`` (k,): their positions, between 0 and 1, along the line of a ``length`` [mm] through their centres.
     """
 
     sections: tuple[CrossSection, ...]
@@ -64,8 +64,8 @@ class Contours:
 def contours(field: FibreField, count: int, towards: Floats | None = None) -> Contours:
     """``count`` sections between the attachments, with about equal volumes between them; a section with holes is left out.
 
-    The first side of the middle section's square is along ``towards`` (3,) or, if None, along its longest axis; the squares of the
-    other sections follow from section to section by the nearest points of their rims.
+    The first side of the middle section's square is along ``towards`` (3,) or, if this is None, along the longest axis. The squares
+    of the other sections follow from section to section by the nearest points of their rims.
     """
     means = field.values[field.mesh.tets].mean(axis=1)
     levels = np.quantile(means, (np.arange(count) + 0.5) / count)
@@ -97,8 +97,8 @@ def _first(middle: CrossSection, product: Floats, towards: Floats | None) -> Flo
 
 
 def template(count: int, slope: float) -> Floats:
-    """Control points (count, 2, 3) of Bezier curves in the unit cube, spread evenly (Halton): parallel to its third axis, or
-    inclined towards the first axis by the ``slope`` and cut off at the cube's sides.
+    """Control points (count, 2, 3) of Bezier curves in the unit cube, spread evenly (Halton). The curves are parallel to the third
+    axis, or inclined towards the first axis by the ``slope`` and cut off at the cube's sides.
     """
     across = halton(count, 2)
     margin = _SHORTEST * min(slope, 1.0)

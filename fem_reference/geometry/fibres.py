@@ -74,8 +74,8 @@ class FibreField:
 
 
 def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
-    """A Laplace field in the tetrahedra of a muscle, by linear elements. It is 0 on the facets ``start`` of the ``mesh``, 1 on
-    ``end``, and 1/2 where the two touch, as they may on a coarse mesh; elsewhere on the boundary its flux is 0.
+    """The Laplace field in the tetrahedra of a muscle, by linear elements. It is 0 on the facets ``start`` of the ``mesh`` and 1 on
+    ``end``. It is 1/2 where the two touch, as they may on a coarse mesh. The flux through the rest of the boundary is 0.
     """
     zeros, ones = np.unique(mesh.facets[start]), np.unique(mesh.facets[end])
     values = np.zeros(len(mesh.points))

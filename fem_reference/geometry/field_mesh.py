@@ -58,7 +58,7 @@ class FieldMesh:
         return np.asarray(np.sqrt(np.maximum(np.linalg.det(gram), 0)) / (self.cells.shape[1] - 1))
 
 
-POINTS = 5  # of the quadrature rules along each direction: exact up to degree 9
+POINTS = 5  # the number of quadrature points along each direction: exact up to degree 9
 # The largest allowed coordinate, so that areas and results computed from it are finite.
 FURTHEST = 1e50
 
@@ -158,8 +158,8 @@ def l2_distance(mesh: FieldMesh, values: Floats, exact: Callable[[Floats], Float
 @cache
 def rule(corners: int) -> tuple[Floats, Floats]:
     """Barycentric coordinates (q, k) of the points of a quadrature rule for cells with k ``corners``, 2 or 3, and its weights (q,),
-    whose sum is 1: Gauss-Legendre, and in a triangle its product with Gauss-Jacobi along lines through a corner (Stroud 1971,
-    Approximate Calculation of Multiple Integrals, 2.4).
+    whose sum is 1. The rule is Gauss-Legendre; in a triangle, its product with Gauss-Jacobi along lines through a corner (Stroud
+    1971, Approximate Calculation of Multiple Integrals, 2.4).
     """
     x, w = scipy.special.roots_legendre(POINTS)
     along, weights = (1 + x) / 2, w / 2

@@ -1,8 +1,8 @@
 """Fibres by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves evenly over the other.
 
 The flux per area of an attachment is constant, so lines that start evenly over one attachment end evenly over the other, and cover
-both. In contrast, the gradient of a potential that is constant on attachments is concentrated at their rims: in a sheet with a
-fully attached face, nearly all lines start at the edge next to the other attachment.
+both. In contrast, the gradient of a potential that is constant on attachments is concentrated at their rims. In a sheet with a
+fully attached face, nearly all its lines start at the edge next to the other attachment.
 """
 
 from dataclasses import dataclass
@@ -26,8 +26,8 @@ from fem_reference.foundations.mesh import (
 from fem_reference.geometry.fibres import POINTS, FibreField, averaged, resample, spread
 
 MOST = 1000  # the greatest number of fibres
-_LINES, _LINES_EACH = 1000, 8  # least number of lines in all, and per fibre; the fibres are chosen among these lines
-_ROUNDS = 50  # the most iterations of Lloyd's algorithm, which converges in fewer
+_LINES, _LINES_EACH = 1000, 8  # the least number of lines in all, and per fibre; fibres are chosen among these lines
+_ROUNDS = 50  # the largest number of iterations of Lloyd's algorithm, which converges in fewer
 _PLASTIC = 1.324717957244746  # x^3 = x + 1: its powers spread points evenly (Roberts 2018, the R2 sequence)
 
 
@@ -54,7 +54,7 @@ class Flow:
 
 def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
     """The flow from the facets ``start`` of a ``mesh`` to ``end``, uniform over the area of each and 0 through the rest of the
-    boundary: the gradient of a potential with ``-laplace u = 0`` and ``du/dn = -1/A_start``, ``1/A_end`` or 0.
+    boundary. It is the gradient of a potential with ``-laplace u = 0`` and ``du/dn = -1/A_start``, ``1/A_end`` or 0.
 
     The elements are of the Crouzeix-Raviart type. Their gradients are lowest-order Raviart-Thomas fields, so the flux out of a
     tetrahedron is exactly the flux into the next (Marini 1985, SIAM J. Numer. Anal. 22:493).

@@ -57,7 +57,7 @@ def overlaps(one: Floats, other: Floats) -> Floats:
 
 
 def _reach(triangles: Floats, walls: Floats) -> Floats:
-    """Depth (k,) of ``triangles`` beyond the planes of ``walls``, on the side where it is less; NaN if a wall has no area."""
+    """Depth (k,) of ``triangles`` beyond the planes of ``walls``, on the side where it is smaller; NaN if a wall has no area."""
     with np.errstate(invalid="ignore", divide="ignore"):
         across = (found := normals(walls)) / np.linalg.norm(found, axis=1)[:, None]
     heights = np.einsum("kci,ki->kc", triangles - walls[:, :1], across)

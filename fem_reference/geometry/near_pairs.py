@@ -37,7 +37,7 @@ class _Sorted:
             self.code.forget(self.grid)
 
 
-# Pairs with a bone are sought at many frames, each time in its own coordinates.
+# Pairs with a bone are searched at many frames, always in the coordinates of the bone, so its sorted triangles are kept.
 _kept = lru_cache(maxsize=8)(_Sorted)
 
 

@@ -120,7 +120,7 @@ def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) 
     """True if moving ``goes`` onto ``stays`` keeps the surface manifold, edges sharp, and triangles unflipped and not too flat."""
     points, triangles = parts.points, parts.triangles
     here, there = set(triangles[around[goes]].ravel().tolist()), set(triangles[around[stays]].ravel().tolist())
-    if len(here & there) != 4 or len(here | there) < 6:  # the edge has two ends and two triangles, not of a tetrahedron
+    if len(here & there) != 4 or len(here | there) < 6:  # the ends share two neighbours, on more than a tetrahedron
         return False
     old = triangles[around[goes]]
     shift = (points[stays] - points[goes])[None]
@@ -143,8 +143,8 @@ def _flatness(points: Floats, triangles: Ints) -> Floats:
 
 
 def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Floats:
-    """The points (n, 3) [mm] moved so that the parts have given ``areas`` [mm2], from label 1 on, and enclose a ``volume`` [mm3]:
-    before the move both are too small, like a polygon inscribed in a circle. In each round the whole rim of a part moves outwards
+    """The points (n, 3) [mm] moved so that the parts have given ``areas`` [mm2], from label 1 on, and enclose a ``volume`` [mm3].
+    Before the move both are too small, like a polygon inscribed in a circle. In each round the whole rim of a part moves outwards
     by the same distance, at most ``most`` [mm], and then all points move along their normals.
     """
     for _ in range(_ROUNDS):

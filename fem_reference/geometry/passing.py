@@ -14,8 +14,8 @@ _BERNSTEIN = np.linalg.inv(
 
 
 def passed(starts: Floats, ends: Floats, before: Floats, after: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) of points that move straight from ``starts`` to ``ends`` (n, 3) and pass through the triangle in the same row,
-    whose corners move straight from ``before`` to ``after`` (n, 3, 3), from its front to its back.
+    """Mask (n,) of points that pass through the triangle in the same row from its front to its back. The points move straight from
+    ``starts`` to ``ends`` (n, 3), and the corners of the triangles from ``before`` to ``after`` (n, 3, 3).
 
     The volume of the tetrahedron between point and triangle is a cubic function of the share of the path (Provot 1997, Collision
     and self-collision handling in cloth model dedicated to design garments); where it is 0, the point is in the plane.

@@ -49,7 +49,7 @@ class Depths:
     places: Floats
 
     def deepest(self, rest: "Depths | None" = None) -> tuple[float, Floats]:
-        """The greatest depth [mm] beyond that at ``rest``, and its place (3,) [mm]."""
+        """The greatest depth [mm] in excess of the depth at ``rest``, and its place (3,) [mm]."""
         beyond = self.values.copy()
         if rest is not None:
             _, here, there = np.intersect1d(self.at, rest.at, assume_unique=True, return_indices=True)
@@ -169,7 +169,7 @@ def _parts_of(surface: Surface) -> tuple[Ints, Ints]:
 
 @lru_cache(maxsize=8)
 def _parts(triangles: bytes) -> tuple[Ints, Ints]:
-    """The first vertex of each part of a surface of ``triangles``, 64 bit integers, and the index (n,) of the part of each."""
+    """The first vertex of each part of a surface of ``triangles``, 64-bit integers, and the index (n,) of the part of each."""
     corners = np.frombuffer(triangles, np.int64).reshape(-1, 3)
     parts = connected_parts(corners[:, :2].ravel(), corners[:, 1:].ravel(), int(corners.max()) + 1)
     return np.unique(parts, return_index=True)[1], parts
@@ -218,14 +218,14 @@ def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: 
 
 
 def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
-    """Mask (k,) of the points (k, 3) of a ``body`` that are inside; all False if their mean is outside the surface's box."""
+    """Mask (k,) of the points (k, 3) of a ``body`` inside the surface; all False if their mean is outside the surface's box."""
     middle, low, high = body.sum(axis=0) / max(1, len(body)), surface.points.min(axis=0), surface.points.max(axis=0)
     boxed = len(body) > 0 and bool(((middle > low) & (middle < high)).all())
     return inside(surface, body) if boxed else np.zeros(len(body), bool)
 
 
 def _touches(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance) -> bool:
-    """True if a counted triangle enters the body; tested at vertices and, near the body, at those of parts of triangles."""
+    """True if a counted triangle enters the body; tested at vertices and, near the body, at corners of parts of triangles."""
     triangles = surface.triangles[counts]
     corners, away = surface.points[triangles], gaps[triangles]
     for _ in range(_PARTINGS):

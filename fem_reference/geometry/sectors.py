@@ -10,7 +10,7 @@ _SHARP = np.cos(np.radians(45))
 
 
 def sectors(surface: Surface) -> Ints:
-    """The index (m, 3) of the sector of each corner of the triangles: a part around a vertex, from sharp edge to sharp edge."""
+    """The index (m, 3) of the sector of each corner of the triangles: the part around a vertex from one sharp edge to the next."""
     triangles = surface.triangles
     normals = unit_normals(surface.points[triangles])
     one, other = twins(triangles).T

@@ -59,7 +59,7 @@ class Grid:
     is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and ``FAR`` outside the grid.
     ``error`` [mm] is the largest difference found from the exact distance within one spacing of the surface, and
     ``mean_error`` [mm] the root mean square there. Farther away, the ridges between two close parts of the surface are rounded like
-    edges, by a third of a spacing. The gradient is the spline's: a unit vector up to a few percent, more on edges.
+    edges, by a third of a spacing. The gradient is that of the spline: its length is 1 within a few per cent, except on edges.
     """
 
     coefficients: Floats
@@ -144,10 +144,10 @@ def _weights(within: Floats, orders: int) -> Floats:
 
 def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:
     """The signed distance to a closed ``surface``, sampled on a grid with nodes ``spacing`` [mm] apart, and valid within ``margin``
-    [mm] of it. Single triangles may have any orientation; InputError if the surface bounds no body, as in ``check_closed``.
+    [mm] of it. Individual triangles may have any orientation; InputError if the surface bounds no body, as in ``check_closed``.
 
     ``rounding`` is the standard deviation s [mm] of a Gaussian filter of the distance, used because contact does not slide smoothly
-    along flat triangles; a surface with a mean curvature of 1/r moves inward by s^2/r. This shift is part of the error.
+    along flat triangles. A surface with a mean curvature of 1/r moves inward by s^2/r; this shift is part of the error.
     """
     check_finite(surface)
     outward, _ = igl.bfs_orient(surface.triangles)
@@ -165,8 +165,8 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
     """The grid of :func:`build` whose spacing is halved until its ``mean_error`` is at most ``error`` [mm] or ``MOST_NODES`` is
     reached; the grid's ``mean_error`` states the reached error.
 
-    The largest error is not a suitable measure: on sharp edges and thin rims, which a grid rounds, it decreases only in proportion
-    to the spacing, and does not decrease in a slit narrower than a cell.
+    The largest error is not a suitable measure. On sharp edges and thin rims, which a grid rounds, it decreases only in proportion
+    to the spacing; in a slit narrower than a cell it does not decrease.
     """
     spacing = float(np.ptp(surface.points, axis=0).max()) / _FIRST_CELLS
     grid = build(surface, spacing, margin)
@@ -180,7 +180,7 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
 
 
 def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
-    """The grid of :func:`build` at the spacing of :func:`resolve`, stored in ``folder`` under a hash of all that determines it."""
+    """The grid of :func:`build` at the spacing of :func:`resolve`, stored in ``folder`` under a hash of all its inputs."""
     code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
     name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
 

@@ -20,14 +20,14 @@ _QUARTERS = np.array(
     ]
 ) / 2  # fmt: skip
 _RULE = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
-# The least number of points along the diagonal of a surface: on muscles of the hip they are 3 mm apart.
+# The least number of points along the diagonal of a surface: on hip muscles the points are 3 mm apart.
 _ACROSS = 80
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Material points of a surface that the mesh follows only roughly: the straight ``cells`` (n,) that carry them, their rest
-    positions ``points`` (n, 3) [mm], possibly slightly outside their cell, and their rest ``areas`` (n,) [mm2].
+    """Material points of a surface that the mesh follows only roughly. They have straight ``cells`` (n,) that carry them, rest
+    positions ``points`` (n, 3) [mm], possibly slightly outside their cells, and rest ``areas`` (n,) [mm2].
     """
 
     cells: Ints
@@ -52,7 +52,7 @@ def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float)
 
 def points(corners: Floats, shares: Floats) -> tuple[Floats, Floats]:
     """Three points (3 k, 3) [mm] in each triangle of ``corners`` (k, 3, 3) by a rule exact for quadratic functions, and their areas
-    (3 k,) [mm2], weighted by ``shares`` (k, 3). None is on a sharp edge, where it would be in contact on two faces at once.
+    (3 k,) [mm2], weighted by ``shares`` (k, 3). No point is on a sharp edge, where it would be in contact on two faces at once.
     """
     areas = np.repeat(corner_areas(corners) / 3, 3) * (shares @ _RULE.T).ravel()
     return np.einsum("qk,tki->tqi", _RULE, corners).reshape(-1, 3), areas

@@ -57,7 +57,7 @@ def _halfway(lines: Floats) -> Floats:
 
 def outermost(lines: Polylines, count: int) -> Polylines:
     """At most ``count`` of ``lines``, with 40 points each: the line that is outermost halfway in each of ``count`` sectors. Sectors
-    are equal after a stretch that makes the section as wide in all directions, so that a flat muscle has lines on all sides.
+    are equal after a stretch that makes the section equally wide in all directions, so that a flat muscle has lines on all sides.
     """
     found = _alike(lines, 0)
     arms = _halfway(found)
@@ -66,7 +66,7 @@ def outermost(lines: Polylines, count: int) -> Polylines:
         raise InputError("fibres.chmd.around", "lines on one surface", "a muscle with a thickness")
     round_ones = arms @ (axes / np.sqrt(scales)) @ axes.T
     angles = np.arctan2(round_ones[:, 1], round_ones[:, 0])
-    angles -= angles[np.argmax(arms[:, 0])]  # the farthest
+    angles -= angles[np.argmax(arms[:, 0])]  # relative to the farthest line
     sectors = np.rint(count * angles / (2 * np.pi)).astype(np.int64) % count
     order = np.lexsort((-np.linalg.norm(round_ones, axis=1), sectors))
     _, chosen = np.unique(sectors[order], return_index=True)

@@ -1,6 +1,6 @@
 """Closed triangulated surfaces of bones of simple shapes, for pictures and for code that needs the surface of a bone.
 
-Their vertices lie on the body. A ball, a capsule and a box are built in one way: from the octants of a sphere, moved apart.
+Their vertices lie on the body. A ball, a capsule and a box are built in the same way, from the octants of a sphere moved apart.
 """
 
 import numpy as np
@@ -63,8 +63,8 @@ def _rounded(size: Vector, rounding: float, turn: int) -> tuple[Floats, Ints]:
 
 
 def _ticks(half: float, rounding: float, count: int) -> tuple[Floats, Floats]:
-    """The rounded corners at -``half`` and ``half`` along an axis, each in ``count`` steps of equal angles from the middle of a
-    face to the edge of a cube: the tangents of the angles, and the centre of each. Two corners about one centre share their middle.
+    """The tangents of the angles, and the centres, of the rounded corners at -``half`` and ``half`` along an axis. Each corner has
+    ``count`` equal steps of angle from the middle of a face to the edge of a cube; two corners about one centre share their middle.
     """
     if rounding == 0:
         return np.array([-1.0, 1.0]), np.array([-half, half])

@@ -37,19 +37,19 @@ log = logging.getLogger(__name__)
 SECONDS_ALLOWED = 240.0
 _ROUNDED = 6  # decimals [mm] in the mesher's frame: far below any size, far above the round-off from moving a surface
 _VOLUME_WITHIN = (
-    0.05  # relative; a smaller value fails, as the volume of a surface that intersects itself is not well defined
+    0.05  # relative; a smaller value fails, as a surface with self-intersections has no well-defined volume
 )
-_MOST_TETS = 3e6  # needs some GB and minutes, far more than a solver can use
+_MOST_TETS = 3e6  # a mesh that takes some GB and some minutes, and is far too large for a solver
 _MAKERS = {"gmsh": "gmsh", "tetwild": "fTetWild"}
-_SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the requested number of triangles, tried in turn
+_SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # shares of the requested number of triangles, tried in turn
 
 
 def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] | None = None) -> TetMesh:
     """Tetrahedra of edge length ``size`` [mm] that fill a closed, outward ``surface`` of m triangles. Tetrahedra by gmsh have
-    ``facets`` for each attachment; its ``shares`` (m, 3) are the attached shares of the corners of triangles. ``maker`` names the
+    ``facets`` for each attachment; ``shares`` (m, 3) by attachment are the attached shares of triangle corners. ``maker`` names the
     mesher. InputError if no mesher succeeds, and at once if ``size`` is far too small or too large.
 
-    A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface without
+    A surface finer than ``size`` is coarsened first, with edges along the rims of attachments. gmsh fills a surface without
     self-intersections and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so that it moves with
     the surface. If gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (see its issue 72).
     """
@@ -66,7 +66,7 @@ def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] |
 def check_size(surface: Surface, size: float) -> None:
     """Raise InputError if more than ``_MOST_TETS`` regular tets fill a surface, or ``size`` exceeds its smallest extent.
 
-    The extent is measured in the frame of its vertices, so that rotating the surface changes nothing.
+    The extent is measured in the frame of the vertices, so that rotating the surface changes nothing.
     """
     volume, extent = enclosed_volume(surface.points, surface.triangles), np.ptp(surface.points, axis=0).min()
     if not volume <= _MOST_TETS * size**3 / (6 * np.sqrt(2)):
@@ -118,8 +118,8 @@ def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) ->
 
 
 def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> tuple[Surface, Ints]:
-    """The surface with as many triangles as equilateral triangles of side ``size`` would need to cover it, unchanged if it has
-    fewer, with edges along the rims of attachments; and the labels of its triangles, 0 if free.
+    """The surface with edges along the rims of attachments, and the labels of its triangles, 0 if free. It has as many triangles as
+    equilateral triangles of side ``size`` would need to cover it; it is unchanged if it has fewer.
 
     If the coarse surface intersects itself, a few other counts are tried, and then a surface without rims.
     """
@@ -186,8 +186,8 @@ def last_words(done: subprocess.CompletedProcess[str]) -> str:
 def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
     """The largest connected part of ``mesh``, its tets of positive volume, without unused points.
 
-    InputError if nothing is left, a tet is flat, or the volume of the tets is far from that in ``surface``. Their boundary
-    is closed, as no triangle belongs to more than two of them.
+    InputError if nothing is left, a tet is flat, or the volume of the tets is far from that in ``surface``. The boundary
+    of the tets is closed, as no triangle belongs to more than two tets.
     """
     if len(mesh.tets) == 0:
         raise InputError(surface.place, "no tetrahedra from the mesher", "a surface that bounds a body")

@@ -26,8 +26,8 @@ _CHECKED = 200
 class Winding:
     """n paths through K ``knots`` (n, K, 3) [mm], whose unit ``tangents`` are (n, K, 3), after the lengths ``arcs`` (n, K) [mm].
 
-    They follow the obstacles ``met`` (n, m) in turn, each over the same number of knots; on a path with fewer than m obstacles, all
-    other knots are at the end. ``failed`` (n,) is True if Newton's method found no path.
+    The paths follow the obstacles ``met`` (n, m) in turn, each over the same number of knots; on a path with fewer than m obstacles
+    the remaining knots are at the end. ``failed`` (n,) is True if Newton's method found no path.
     """
 
     knots: Floats
@@ -152,7 +152,7 @@ class _Pieces:
 
 @np.errstate(all="ignore")  # NaN counts as failed
 def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Winding:
-    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``; both ends are outside these."""
+    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``, which contain neither end."""
     string = taut(obstacles, starts, ends)
     turns = met(obstacles, string)
     found = Winding.straight(len(obstacles), starts, ends)
@@ -221,7 +221,7 @@ def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
     most = np.array([[one.bend / 2, one.bend / 2, 0.5, one.bend] for one in pieces.obstacles]).ravel()
     todo, part, kinks = np.arange(len(near)), pieces, pieces.kinks()
     for _ in range(_ITERATIONS):
-        left = ~(np.abs(kinks).max(axis=1) <= near[todo])  # True for NaN too
+        left = ~(np.abs(kinks).max(axis=1) <= near[todo])  # also True for NaN
         if not left.any():
             return pieces, np.ones(len(near), dtype=bool)
         part, kinks, todo = part.rows(np.flatnonzero(left)), kinks[left], todo[left]

@@ -23,8 +23,8 @@ from fem_reference.io.formats import Format, formats, vtk
 from fem_reference.io.formats.msh import read_mesh
 from fem_reference.io.texts import beside, check_size, is_file, parsed_xml
 
-# The most bytes of a mesh, a table or an index: a million triangles, more than our meshers and solvers can use. The values of a
-# text file need up to thirty times the memory of the file.
+# The largest size in bytes of a mesh, a table or an index: a million triangles, more than our meshers and solvers can use. The
+# values of a text file need up to thirty times as much memory as the file.
 MOST_BYTES = 2**26
 # A half-written file older than this [s] is removed unless its process runs here; a newer file may be written by another machine.
 _SETTLED = 10.0
@@ -58,7 +58,7 @@ def read_surface(path: Path, unit: float) -> Surface:
 
 def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) -> Surface:
     """The boundary of the tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of the cells (for gmsh
-    ``gmsh:physical``); coordinates are in units of ``unit`` mm. InputError if the file lacks the array or all of the labels.
+    ``gmsh:physical``); coordinates are in units of ``unit`` mm. InputError if the file lacks the array or all labels.
     """
     want = (
         f'tetrahedra with an array "{array}" of integers, some of them {", ".join(map(str, labels))}, as .vtu or .msh'

@@ -60,7 +60,7 @@ def only_triangles(corners: set[int]) -> None:
 
 
 def positions(rows: list[list[float]]) -> Any:
-    """Points (n, 3) from n ``rows``; ValueError if one has fewer coordinates."""
+    """Points (n, 3) from n ``rows``; ValueError if a row has fewer coordinates."""
     if any(len(row) != 3 for row in rows):
         raise ValueError("a position with fewer than three coordinates")
     return np.array(rows)
@@ -98,7 +98,7 @@ class DataSet(NamedTuple):
 
 
 def checked_cells(sizes: Any, corners: Any, points: int) -> PointLists:
-    """Cells of ``sizes`` (m,) in ``corners``; ValueError if one has a negative size or a point that does not exist."""
+    """Cells of ``sizes`` (m,) in ``corners``; ValueError if a cell has a negative size or a point that does not exist."""
     sizes, corners = np.asarray(sizes, np.int64), np.asarray(corners, np.int64)
     if (sizes < 0).any() or (sizes > len(corners)).any() or sizes.sum() != len(corners):
         raise ValueError(f"cells that do not fit in their {len(corners)} corners")
@@ -116,6 +116,6 @@ def whole_number(text: str, name: str) -> int:
 
 
 def check_number(values: Any, count: int, name: str) -> None:
-    """Raise ValueError unless there are ``count`` values; ``name`` says of what."""
+    """Raise ValueError unless there are ``count`` values; the message names them by ``name``."""
     if len(values) != count:
         raise ValueError(f"{len(values)} {name} instead of {count}")

@@ -18,10 +18,10 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 
-# The most bytes of a file: a case file has some kB, a baseline 1.3 kB per frame. The contents need up to thirty times the memory.
+# The largest size of a file in bytes: a case file has some kB, a baseline 1.3 kB per frame. The values need up to 30 times as much.
 MOST_TOML = 2**21
 MOST_JSON = 2**25
-# The most levels of nested tables and lists; case files have up to 6.
+# The largest number of levels of nested tables and lists; case files have up to 6.
 DEEPEST = 32
 # A mesh file may not define entities: they can multiply a text a billion times, or include other files.
 _FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")

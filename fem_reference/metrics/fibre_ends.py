@@ -11,7 +11,7 @@ from fem_reference.metrics.fibre_length import fibre_points
 from fem_reference.problems.fibre_ends import ends_of
 from fem_reference.runs.store import Run
 
-_TITLE = "Ends of fibres off their bones"
+_TITLE = "Distance of fibre ends from bones"
 STATISTICS = {
     "mean": Statistic("mm", _TITLE, "mean", local=True),
     "max": Statistic(

@@ -1,7 +1,7 @@
 """Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis. A
 moment is positive if it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in space.
-By virtual work, without dissipation, the moment is minus the slope of the stored energy in the angle. Lines of action pull at their
-ends, via-points and obstacles. The force is not known for lines without ``hill`` and for most fast solvers.
+By virtual work, without dissipation, the moment is minus the derivative of the stored energy with respect to the angle. Lines of
+action pull at their ends, via-points and obstacles. The force is not known for lines without ``hill`` and for most fast solvers.
 
 The arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with little
 force (docs/measures.md).

@@ -1,4 +1,4 @@
-"""Distance of a field from the exact solution at the vertices, if a case has an exact solution."""
+"""Difference between a field and the exact solution at the vertices, if a case has an exact solution."""
 
 import numpy as np
 

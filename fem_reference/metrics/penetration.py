@@ -32,7 +32,7 @@ STATISTICS = {
 }
 OF, AGAINST = "surface", "itself"
 
-# A triangle is small enough to follow a bone with edges up to this many times the reach of ``Exemption``.
+# A triangle is small enough to follow a bone if its edges are at most this many times the reach of ``Exemption``.
 _FOLLOWS = 4.0
 # A point deeper than this share of half the thickness is in the middle of a bone, and may leave the bone on the other side.
 _MIDDLE = 0.75
@@ -56,7 +56,7 @@ def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Mea
     of the muscle reaches the middle of the bone, the depth of the interior counts. Near an attachment only depth added since rest
     counts. The same holds for an attachment inside another bone that moves differently; inside its own bone depth is not checked.
     A triangle follows a bone if all its corners are within the reach of ``Exemption`` and its edges are shorter than four times
-    that reach: any greater depth between them is the part of a round bone that a flat triangle cuts off.
+    that reach. Any greater depth between the corners is the part of a round bone that a flat triangle cuts off.
 
     The depth is as accurate as the field of the bone (``Grid.mean_error``, with rounding). The volume is estimated from random
     points (``shared``). On the muscles of a hip, 12 volumes from 5 to 24 000 mm3 differed by less than 1 % from an estimate with
@@ -119,8 +119,8 @@ def _deepest(exempt: Exemption, fine: Surface, bone: str, gaps: Floats, allowed:
 
 
 def _allowed(exempt: Exemption, bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> dict[str, Floats]:
-    """The allowed depth [mm] at the corners (k,) of the pieces of a surface, by bone: 0 where contact acts, the depth at rest near
-    attachments, and any depth on attachments to this bone or to a bone that moves in the same way at all frame ``numbers``.
+    """The allowed depth [mm] at the corners (k,) of the pieces of a surface, by bone. It is 0 where contact acts, the depth at rest
+    near attachments, and infinite on attachments to this bone or to a bone that moves in the same way at all frame ``numbers``.
     """
     near, on = exempt.corners.away <= exempt.reach, exempt.corners.away == 0
     rest = exempt.corners.carried @ exempt.surface.points

@@ -25,7 +25,7 @@ STATISTICS = {
     "pressure_p95": _of_field("pressure, 95th percentile"),
 }
 OF, AGAINST = "surface", "reference"
-_KILO = 1000.0  # kPa in a MPa
+_KILO = 1000.0  # kPa per MPa
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:  # noqa: ARG001

@@ -82,11 +82,11 @@ def test_show_says_what_bones_are_and_how_they_move(squeezed, bar) -> None:
     assert facts["attachments"] == {}
     assert facts["bones"] == {
         "floor": "half space of point (0, 10, 0), normal (0, 1, 0), mm, rests",
-        "lid": "box of centre (0, 140, 0), size (400, 100, 400), rounding 0, mm, slides along (0, -1, 0), "
-        "mm at frame: 0 at 0, 40 at 100",
+        "lid": "box of centre (0, 140, 0), size (400, 100, 400), rounding 0, mm, slides along (0, -1, 0): "
+        "0 mm at frame 0, 40 mm at frame 100",
     }
     turning = casefile.read(bar)
-    assert "turns about (5, 5, 30) mm along" in case_facts(turning, muscle.setup(turning))["bones"]["lid"]
+    assert "through (5, 5, 30) mm: 0 rad at frame 0, " in case_facts(turning, muscle.setup(turning))["bones"]["lid"]
 
 
 def test_a_muscle_has_its_volume_the_areas_of_its_ends_and_its_effects(bar) -> None:

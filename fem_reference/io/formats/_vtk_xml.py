@@ -22,7 +22,7 @@ _KINDS = {"PolyData": ("Lines", "Strips", "Polys"), "UnstructuredGrid": ("Cells"
 _TYPES = {"Float32": "f4", "Float64": "f8"}
 _TYPES |= {f"{sign}Int{8 * size}": f"{sign or 'i'}{size}".lower() for sign in ("", "U") for size in (1, 2, 4, 8)}
 _END = re.compile(rb"</AppendedData>\s*</VTKFile>\s*\Z")
-# The most bytes of a compressed array once it is expanded.
+# The largest size in bytes of a compressed array after it is expanded.
 _MOST = 2**28
 
 
@@ -62,7 +62,7 @@ def _points(piece: Element, arrays: "_Arrays") -> Any:
 
 
 def _cells(piece: Element, name: str, arrays: "_Arrays", points: int) -> tuple[Ints, Ints, Ints]:
-    """Sizes, corners and types of the cells of a piece with this ``name``; ``points``: their number; polygons have no types."""
+    """Sizes, corners and types of the cells of a piece by ``name``, for a number of ``points``; polygons have no types."""
     count, found = _number_of(piece, name), {one.get("Name"): one for one in piece.findall(f"{name}/DataArray")}
     wanted = ("offsets", "connectivity", *(["types"] if name == "Cells" else []))
     ends, corners, *types = (np.asarray(arrays.read(found[key]) if count else [], np.int64) for key in wanted)
