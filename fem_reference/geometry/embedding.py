@@ -43,7 +43,7 @@ class Locator:
         self._tree.init(mesh.points, mesh.tets)
 
     def embed(self, points: Floats) -> Embedding:
-        """The tets that contain ``points`` (n, 3) [mm]."""
+        """The embedding of ``points`` (n, 3) [mm]."""
         points = np.ascontiguousarray(points, np.float64)
         tets = self._containing(points)
         lost = np.flatnonzero(tets < 0)

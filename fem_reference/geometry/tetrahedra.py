@@ -100,7 +100,7 @@ def _mesh(surface: Surface, size: float, shares: Mapping[str, Floats]) -> TetMes
         reason = f"{crossing} triangles pass through the surface"
     else:
         try:
-            log.info("%s: gmsh fills %d triangles", surface.place, len(coarse.triangles))
+            log.info("%s: gmsh fills a surface of %d triangles", surface.place, len(coarse.triangles))
             mesh = checked(run("gmsh", coarse, size), coarse)
             return replace(mesh, facets=_labelled(mesh, coarse, labels, list(shares)))
         except InputError as error:

@@ -1,8 +1,8 @@
 """Metrics: one file each, named as in scene files and JSON. A metric does not know the solver of a run.
 
-Contract (tests/contracts/test_every_metric.py): a run against itself gives zero, a known change a known value, NaN stays NaN, and
-units are stated. Each metric describes its ``STATISTICS`` and states the part of a run that it measures (``OF``: surface, lines or
-field) and its standard (``AGAINST``): the reference (or the rest state), the exact solution, or the run itself.
+Contract (tests/contracts/test_every_metric.py): a run against itself gives zero, a known change gives a known value, NaN stays
+NaN, and units are stated. Each metric describes its ``STATISTICS`` and states the part of a run that it measures (``OF``: surface,
+lines or field) and its standard (``AGAINST``): the reference (or the rest state), the exact solution, or the run itself.
 """
 
 import importlib
@@ -35,8 +35,8 @@ class Statistic:
     """The description of a statistic by its metric.
 
     ``title`` and ``part``: headings of the group of columns and of the column. ``headline``: a sentence with ``{}`` for the value.
-    ``curve``: the title of the plot of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: its position by
-    place, the least first. ``local``: True if its error has the order of the error at the worst place. ``lone``: True for the value
+    ``curve``: the title of the plot of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: its rank by
+    place, from the least. ``local``: True if its error has the order of the error at the worst place. ``lone``: True for the value
     of a single fibre or of the force on a bone, which is not a mean. ``pooled``: True if the statistics of its metric belong to one
     field in one unit; the rms of all then replaces a difference that is small by chance.
     """
@@ -103,7 +103,7 @@ class Measure:
 @dataclass(frozen=True)
 class Worst:
     """A measure in its worst ``frame`` (a number, at ``index``). ``value`` and ``error_bar``, the bar of the reference (None if
-    there is none), are in ``unit``; ``where`` is the place in words.
+    it has none), are in ``unit``; ``where`` is the place in words.
     """
 
     value: float

@@ -183,7 +183,7 @@ def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
     for entry in prescribed:
         place = f"prescribed.{entry.name}"
         if not isinstance(entry.name, str) or not isinstance(entry.on, str | Skin):
-            raise InputError(f"{place}: name and on", f"{said(entry.name)}, {said(entry.on)}", "a text, and a region")
+            raise InputError(f"{place}: name and on", f"{said(entry.name)}, {said(entry.on)}", "a text and a region")
         if names.count(entry.name) > 1:
             raise InputError("prescribed", f'"{entry.name}" twice', "a different name for each")
         axes = isinstance(entry.components, tuple | list) and len(entry.components) > 0

@@ -59,7 +59,7 @@ class Decision:
         """The decision in words."""
         if self.indicator is None:
             pressing = isinstance(self.effect, Interaction)
-            return "kept, as no estimate shows what touches" if pressing else "kept, part of the material"
+            return "kept, as no estimate shows what touches" if pressing else "kept, as part of the material"
         return f"{self._word}, about {self._because}; {self.indicator.rule}: {self.indicator.number:.2g}"
 
     def __str__(self) -> str:
@@ -72,7 +72,7 @@ class Decision:
         if not self.needed:
             return "left out"
         if self.turned_out is not None:
-            return f"needed as it turned out at frame {self.turned_out}"
+            return f"found to be needed at frame {self.turned_out}"
         pressing = isinstance(self.effect, Interaction)
         return "watched, and in the equations where a surface is pressed" if pressing else "needed"
 

@@ -35,7 +35,7 @@ _SHORTEST = 1e-9  # the share of all frames within which a long motion counts as
 
 @dataclass(frozen=True)
 class Moving:
-    """Moving points (p, 3) [mm] ``at`` a frame, their known ``turning``, and their ``place`` in messages; ``scale``: an amount."""
+    """Moving points (p, 3) [mm] ``at`` a frame, their ``turning``, if known, and ``place``, for messages; ``scale``: an amount."""
 
     place: str
     at: Callable[[float], Floats]

@@ -63,7 +63,7 @@ class FieldProblem:
         return self
 
     def write_meshes(self, folder: Path) -> None:
-        """Write the mesh, with the values that are fixed, into ``folder``, for ParaView."""
+        """Write the mesh with its fixed values into ``folder``, for ParaView."""
         points, cells = self.mesh.points, self.mesh.cells
         files.write_field(folder / "mesh.vtu", points, cells, {"fixed": self.fixed[: len(points)]})
 
