@@ -1,4 +1,4 @@
-"""Answers to the usual requests to a study: a setting within an error, at a frame rate, and at the knee of the front."""
+"""Answers to the usual requests to a study: the best setting within an error, at a frame rate, and at the knee of the front."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,8 +12,8 @@ RATE = 60.0  # the requested rate [frames a second]
 
 @dataclass(frozen=True)
 class Answer:
-    """The ``best`` setting for a request, None if no setting meets it, and the best ``by_solver``; the ``limits`` of error and time
-    [s], empty for the knee. ``nearest``: if no setting meets the limits, the setting that misses them least.
+    """The answer to a request with ``limits`` of error and time [s], empty for the knee: the ``best`` setting, None if no setting
+    meets it, and the best ``by_solver``. ``nearest``: if no setting meets the limits, the setting that misses them least.
     """
 
     limits: Mapping[str, float]
@@ -40,7 +40,7 @@ def answers(known: Sequence[Expected]) -> tuple[Answer, ...]:
 
 def knee(known: Iterable[Expected]) -> Expected | None:
     """The setting at the knee of the front of error against time: in logarithms, farthest below the line that joins its ends (Das
-    1999, Structural Optimization 18, 107-115). None for a front of fewer than three points, or nowhere below the line.
+    1999, Structural Optimization 18, 107-115). None for a front of fewer than three points, or if no point is below the line.
     """
     front = list[Expected]()
     for one in sorted(known, key=lambda one: (one.time, one.error)):

@@ -1,4 +1,4 @@
-"""Bands over the frames from the results of runs with other parameters: by a surrogate if it is accurate, else by the runs."""
+"""Bands of results over the frames, from runs with varied parameters: by a surrogate if it is accurate, else by the runs."""
 
 import math
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ _SHARE = 1e-6  # the share of the variance of a field that its principal compone
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """The ``parameters`` and their ``points`` (n, d) from -1 to 1 in the runs that have answers, of ``wanted`` runs."""
+    """The ``parameters``, the number of ``wanted`` runs, and the ``points`` (n, d), from -1 to 1, of the runs with answers."""
 
     parameters: tuple[Parameter, ...]
     points: Floats
@@ -34,7 +34,7 @@ class Design:
         """The reason why these runs are too few for a band, empty if they are not."""
         made, variables = len(self.points), self.points.shape[1]
         if made < 2 * (variables + 1):
-            return f"{made} runs have answers, and {2 * (variables + 1)} are the fewest for {variables} parameters"
+            return f"{made} runs have answers, but {variables} parameters need at least {2 * (variables + 1)}"
         if self.wanted - made > MISSING * self.wanted:
             lost = f"{self.wanted - made} of {self.wanted} runs have no answer"
             return f"{lost}: they might all lie beyond the 5th or the 95th percentile"
@@ -43,7 +43,7 @@ class Design:
 
 def sampled(variables: int, runs: int, seed: int) -> Floats:
     """Points (runs, d) from -1 to 1 of a Latin hypercube: one value of each variable in each of ``runs`` equal parts."""
-    from scipy.stats import qmc  # here, as importing it takes half a second
+    from scipy.stats import qmc  # imported here, as this takes half a second
 
     return np.asarray(2 * qmc.LatinHypercube(variables, rng=np.random.default_rng(seed)).random(runs) - 1)
 
@@ -63,7 +63,7 @@ def of_values(band: Band, design: Design, values: Floats) -> Band:
 
 def of_field(band: Band, design: Design, products: Floats) -> Band:
     """The ``band`` of the root mean square of a field over its weights, from the ``products`` (f, n, n) of the weighted fields of
-    each two runs in each frame. The surrogate describes the field by its principal components, as the distance has a kink at 0.
+    each pair of runs in each frame. The surrogate describes the field by its principal components, as the root has a kink at 0.
     """
     if refused := design.refused or _not_numbers(products):
         return replace(band, refused=refused)
@@ -96,7 +96,7 @@ def _banded(
     why = f"{missed}, more than {100 * WORST:.0f} %"
     if len(runs) < FEWEST:
         return replace(
-            band, unreliable=why, refused=f"{why}, and {len(runs)} runs are too few for percentiles of their own"
+            band, unreliable=why, refused=f"{why}, and {len(runs)} runs are too few for percentiles without it"
         )
     return _filled(replace(band, by="runs", unreliable=why), defined, np.quantile(runs, PERCENTILES, axis=0))
 

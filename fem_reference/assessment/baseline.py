@@ -32,16 +32,16 @@ POSITION_PLACES = 2
 POSITION_ROUNDING = math.sqrt(3) * 0.5 * 10**-POSITION_PLACES
 # The number of sampled vertices, which take about 1.3 kB per frame. Motion of other vertices is visible only in the statistics.
 SAMPLED = 64
-# The tolerance of positions [mm] in a new baseline, far below visible differences; too small if machines differ more.
+# The tolerance of positions [mm] in a new baseline, far below visible differences. Machines that differ more need a larger value.
 MOVED = 0.1
 # The tolerance of a statistic is at most this share of its greatest value over the frames.
 SHARE = 0.02
 # The allowed value is slightly above the measured value, to allow for rounding.
 _ROUNDING = 1 + 1e-6
 README = (
-    "tolerance: how far a value may be from the one stored here; within: how far from the reference it may be at most, in the "
-    "same unit (null: not known). Both may be edited; 'check --update' writes the values anew and keeps them. A statistic whose "
-    "entry is removed is not judged."
+    "tolerance: the allowed distance of a value from the value stored here; within: its allowed distance from the reference, in "
+    "the same unit (null: not known). Both may be edited; 'check --update' replaces the values and keeps both limits. A statistic "
+    "whose entry is removed is not judged."
 )
 
 
@@ -102,11 +102,11 @@ def read(path: Path, case: MuscleCase, candidate: str) -> Baseline:
     _check_whose(path, baseline, case, candidate)
     if baseline.scene != case.key:
         got = f"{baseline.scene[:16]}..., while {case.place} is {case.key[:16]}..."
-        want = "the key of this scene (it was changed since; --update takes the current measures)"
+        want = "the key of this scene (it has changed since then; --update stores the current measures)"
         raise InputError(f"{path}: scene", got, want)
     if baseline.frames != case.numbers:
         raise InputError(
-            f"{path}: frames", f"{len(baseline.frames)} numbers, not all of the scene", "its frame numbers"
+            f"{path}: frames", f"{len(baseline.frames)} numbers that differ from the scene's", "its frame numbers"
         )
     return baseline
 
@@ -163,20 +163,20 @@ def _check_shape(place: str, baseline: Baseline) -> None:
         key = f"{place}: measures.{name}"
         if known.get(name) != stored.unit:
             want = "an existing statistic" + (f", in {known[name]}" if name in known else "")
-            raise InputError(key, f'one in "{stored.unit}"', want)
+            raise InputError(key, f'a statistic in "{stored.unit}"', want)
         if len(stored.values) != frames:
-            raise InputError(f"{key}.values", f"{len(stored.values)} values", f"{frames}, one a frame")
+            raise InputError(f"{key}.values", f"{len(stored.values)} values", f"{frames}, one per frame")
     positions = baseline.positions
     if len(positions.values) != frames or {len(row) for row in positions.values} != {len(positions.vertices)}:
         want = f"{len(positions.vertices)} vertices in each of {frames} frames"
-        raise InputError(f"{place}: positions.values", "another number of them", want)
+        raise InputError(f"{place}: positions.values", "a different number of positions", want)
 
 
 def _check_whose(path: Path, baseline: Baseline, case: MuscleCase, candidate: str) -> None:
     """Raise InputError if a baseline belongs to another case or candidate."""
     for key, got, want in (("case", baseline.case, case.name), ("candidate", baseline.candidate, candidate)):
         if got != want:
-            raise InputError(f"{path}: {key}", f'"{got}"', f'"{want}", which is what is checked')
+            raise InputError(f"{path}: {key}", f'"{got}"', f'"{want}", which is being checked')
 
 
 def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> StoredStatistic:
@@ -190,10 +190,10 @@ def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> Store
 
 
 def limits(one: Measure, bars: Floats) -> tuple[float, float | None]:
-    """The tolerance of a change of a statistic and its greatest distance from the reference (None if not known) in a new baseline,
+    """The tolerance for a change of a statistic and its greatest distance from the reference (None if not known) in a new baseline,
     from the error bars (f,) of a deviation.
 
-    Tolerance: the greatest bar, as a smaller change is no change of accuracy, but at most ``SHARE`` of the greatest value, as
+    Tolerance: the greatest bar, as smaller changes do not matter, but at most ``SHARE`` of the greatest value, as
     stored values are exact even if the reference is uncertain. Distance: the greatest sum of a value and its bar; for a measure of
     the run itself, which has no bar, the greatest value plus its tolerance.
     """
@@ -227,7 +227,7 @@ def _rounded(point: Floats) -> tuple[float, float, float] | None:
 
 
 def text(value: Any, indent: str = "") -> str:
-    """JSON with sorted keys, one line for each key and each entry of a list of lists, so that a change is a few lines."""
+    """JSON with sorted keys, one line for each key and each entry of a list of lists, so that a change affects few lines."""
     inside = f"{indent} "
     if isinstance(value, dict):
         rows: Iterable[str] = (f"{json.dumps(key)}: {text(value[key], inside)}" for key in sorted(value))

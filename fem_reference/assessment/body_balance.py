@@ -1,4 +1,4 @@
-"""The balance of the recorded forces on a body, without the solver's residual: by its boundary conditions, bones and dead loads."""
+"""The balance of the recorded forces of boundary conditions, bones and dead loads on a body, without the solver's residual."""
 
 import math
 from collections.abc import Iterator
@@ -15,10 +15,10 @@ from fem_reference.runs.store import Frame, Run
 
 
 def balance(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """The sum of the recorded forces on a ``body`` and of dead loads; without loads also the sum of moments about the origin. No
-    check if some forces are unknown: for a body that begins moved or under tension; with a user's own effects, follower loads,
-    inertia or drag; with loads on cells other than straight tetrahedra; with regions that share a prescribed component, each with
-    the same force.
+    """The sum of the recorded forces on a ``body`` and of dead loads; without loads also the sum of moments about the origin. There
+    is no check if some forces are unknown: for a body that starts displaced or under tension; with a user's own effects, follower
+    loads, inertia or drag; with loads on cells other than straight tetrahedra; with regions that share nodes with a prescribed
+    component, as each region then records the force of these nodes.
     """
     residual, unknowns = getattr(solved.settings, "residual", math.nan), solved.outcome.cost.get("unknowns", math.nan)
     allowed, outer = BALANCE * residual * math.sqrt(unknowns), any(one.outer for one in body.effects)
@@ -39,7 +39,7 @@ def _sum(vectors: dict[str, Floats]) -> Floats:
 
 
 def _counted_once(body: Body, state: Frame) -> bool:
-    """True if a ``state`` has every force on a ``body``, and none twice."""
+    """True if a ``state`` records every force on a ``body``, and none twice."""
     others = {bone.name for bone in body.bones} | {name for law in body.touching for name in law.forces}
     names = {entry.name for entry in body.prescribed}
     if names & others or not names <= set(state.forces) or set(state.forces) != set(state.moments):

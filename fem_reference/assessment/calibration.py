@@ -19,7 +19,7 @@ from fem_reference.io.texts import plain
 
 COLUMNS = ("frame", "quantity", "value", "unit", "sd")
 CONFIDENCE = 0.95
-# Shares of a parameter's range: the step of finite differences, and the distance within which a value is at an end.
+# Shares of a parameter's range: the step of finite differences, and the distance within which a value counts as at an end.
 _STEP, _AT = 1e-3, 1e-3
 # Two estimates whose errors are correlated by more than this are reported as a pair.
 _CORRELATED = 0.95
@@ -38,7 +38,7 @@ _ENDED = "a run that the fit needs has no answer"
 
 @dataclass(frozen=True)
 class Measurement:
-    """A measurement: ``value`` and standard deviation ``sd``, in ``unit``, of a ``quantity``; ``place``: in the file."""
+    """A measurement: ``value`` and standard deviation ``sd``, in ``unit``, of a ``quantity``; ``place``: its place in the file."""
 
     frame: int
     quantity: str
@@ -51,7 +51,7 @@ class Measurement:
 @dataclass(frozen=True)
 class Estimate:
     """A fitted parameter, in the unit of ``parameter``: its ``value`` and confidence interval from ``low`` to ``high``, infinite if
-    the measurements do not determine it; ``at``: the end of the range at which it is, ``"low"``, ``"high"`` or empty.
+    the measurements do not determine it; ``at``: the end of the range at which it lies, ``"low"``, ``"high"`` or empty.
     """
 
     parameter: Parameter
@@ -138,7 +138,7 @@ class _Residuals:
         self.values, self.deviations = (np.array([getattr(row, name) for row in rows]) for name in ("value", "sd"))
 
     def at(self, points: Sequence[Floats]) -> list[Floats]:
-        """The residuals (m,) at each point, infinite if it has no answer."""
+        """The residuals (m,) at each point, infinite if the point has no answer."""
         asked = [point for point in points if point.tobytes() not in self.known]
         for point, found in zip(asked, self.forward(asked), strict=True):
             lost = np.full(len(self.values), np.inf)
@@ -162,8 +162,8 @@ class _Residuals:
 
 def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measurement], case: str) -> Calibration:
     """The parameters within their ranges for which the values of ``forward`` are nearest to the measurements, in standard
-    deviations. The fit starts from the values of the case and steps back from a point without a result; if this is the start, or a
-    point for sensitivities, the fit ends with the reason. InputError unless there are more measurements than parameters.
+    deviations. The fit starts from the values of the case and steps back from a point without a result. If the start or a point for
+    sensitivities has no result, the fit ends with the reason. InputError unless there are more measurements than parameters.
     """
     if len(rows) <= len(parameters):
         raise InputError("data", f"{len(rows)} rows for {len(parameters)} parameters", "more rows than parameters")
@@ -201,7 +201,7 @@ def _ended(residuals: _Residuals, parameters: Sequence[Parameter]) -> tuple[Cali
 def _finite(residuals: Floats) -> Floats:
     if not np.isfinite(residuals).all():
         raise InputError(
-            "calibrate", "values that are not numbers", "ranges of parameters in which the case has them all"
+            "calibrate", "values that are not numbers", "ranges of parameters in which all values are numbers"
         )
     return residuals
 

@@ -44,7 +44,7 @@ class Refinement:
     """Meshes, or steps in time, from coarse to fine.
 
     ``counts``: numbers of cells or steps, each of ``size / count`` [mm] or [s]. The theoretical ``order`` of the error must be met
-    to within a half; None: no order is measured. If ``extrapolated``, the value is extrapolated from the last two counts, for an
+    to within 0.5; None: no order is measured. If ``extrapolated``, the value is extrapolated from the last two counts, for an
     error of first order. ``note``: further facts for readers.
     """
 
@@ -60,7 +60,7 @@ class Refinement:
         return self.counts[-2 if self.extrapolated else -1 :]
 
     def value(self, found: Sequence[float]) -> float:
-        """The judged value, from those ``found`` from coarse to fine."""
+        """The judged value, from the values ``found``, in order from coarse to fine."""
         return 2 * found[-1] - found[-2] if self.extrapolated else found[-1]
 
 
@@ -72,13 +72,13 @@ class Entry:
     ``refinement`` if there is one, and the values ``given`` by name. The number must equal the truth to ``within`` (in ``unit``, or
     relative to the truth if ``relative``), for the reason ``because``. ``source``: the source of the truth; ``kind``: its type.
     ``negative_control`` names a deliberate mistake; with the values ``wrong`` instead of ``given`` the entry must fail. ``slow``: a
-    measurement takes more than 4 s, or resembles another; ``slow_negative_control``: the same for the control. Only verify measures
-    these.
+    measurement takes more than 4 s, or resembles another; ``slow_negative_control``: the same for the control. Only the verb verify
+    makes slow measurements.
 
     An entry of the kind "experiment" compares a model with a muscle: its verdict is "within" or "outside" the uncertainty of the
     experiment, and neither is a failure. It fails if the value no longer equals ``pinned``. ``facts``: the measured numbers from
-    which its truth is made; ``is_order``: True for an order, which is met (1) or not (0), to a half; ``from_memory``: True if a
-    part of its model or of its source is from memory.
+    which its truth is computed; ``is_order``: True for an order of stiffness, whose value is 1 if it is met and 0 if not, within
+    0.5; ``from_memory``: True if a part of its model or of its source is from memory.
     """
 
     name: str

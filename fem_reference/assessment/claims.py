@@ -49,7 +49,7 @@ class Cover:
 
 @dataclass(frozen=True, eq=False)
 class Claims:
-    """All claims; by case the ``sizes`` [mm] of the reference's and the finer tetrahedra; ``missing``: why a case has no claims."""
+    """All claims; by case the ``sizes`` [mm] of the reference's and the finer tetrahedra, and the reason for ``missing`` claims."""
 
     claims: tuple[Claim, ...]
     sizes: dict[str, tuple[float, float]]

@@ -1,4 +1,4 @@
-"""A reference and its candidates, measured and judged, as input of reports."""
+"""A reference and its candidates, measured and judged, as input for reports."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -39,11 +39,11 @@ class Convergence:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """``setup``: the muscle's ``Setup`` or the ``FieldProblem``. ``deviations``: by candidate name, its measures against the
-    reference. ``changes``: by run name (``"reference"`` among them), its measures against the rest state; for a field, which has no
-    rest state, measures without a reference. ``extension_error`` [mm]: by frame, the greatest error over the fibres of the
-    extension on the reference's surface, None without an extension. ``error_bars``: bars of the reference, None if not computed;
-    ``ladders``: its convergence, if measured.
+    """The runs of a case with their measures and verdicts. ``setup``: the muscle's ``Setup`` or the ``FieldProblem``.
+    ``deviations``: by candidate name, its measures against the reference. ``changes``: by run name (also ``"reference"``), its
+    measures against the rest state; for a field, which has no rest state, measures without a reference. ``extension_error`` [mm]:
+    by frame, the greatest error over the fibres of the extension on the reference's surface, None without an extension.
+    ``error_bars``: bars of the reference, None if not computed; ``ladders``: its convergence, if measured.
     """
 
     scene: Case
@@ -84,7 +84,8 @@ class Comparison:
             for it in [one.worst]
             for known in ["" if it.error_bar is None else f"± {it.error_bar:.2g} {it.unit}"]
         ]
-        return table(f"{self.scene.name}: {self.word}", ("candidate", "measure", "greatest", "known to", "frame"), rows)
+        heads = ("candidate", "measure", "greatest deviation", "error bar", "frame")
+        return table(f"{self.scene.name}: {self.word}", heads, rows)
 
     @property
     def rankings(self) -> tuple[Ranking, ...]:
@@ -94,7 +95,7 @@ class Comparison:
 
     @cached_property
     def unsound(self) -> dict[str, str]:
-        """Reasons why the frames of candidates are no answer, by name; none of fields."""
+        """Reasons why the frames of candidates are unusable, by name; none for fields."""
         if "surface" not in self.reference.carries:
             return {}
         return {run.name: why for run in self.candidates if (why := unsound(run, self.reference))}
@@ -106,7 +107,7 @@ class Comparison:
 
     @property
     def word(self) -> Word:
-        """The verdict of the case; a denied reference is never the basis of a verdict."""
+        """The verdict on the case, which fails if the second check denies the reference."""
         if self.reference.outcome.status == "denied":
             return "fail"
         return doubted(overall(one.word for one in self.verdicts), self.doubts)
@@ -124,7 +125,7 @@ def compare(
 ) -> Comparison:
     """Measure and judge runs of a case against the ``reference`` as the truth; only the parts that a run carries are judged.
     ``candidates`` have all frames of the case, with NaN for frames not reached; a measure that is uncertain within ``error_bars``
-    is inconclusive. InputError if the case expects a measure of a named run that lacks it because it has no surface.
+    is inconclusive. InputError if the case expects a measure of a named run that this run lacks because it has no surface.
     """
     context, runs = metrics.context_of(setup, reference), (reference, *candidates)
     candidate, alone = metrics.names(case.standards("candidates")), metrics.names(case.standards("reference"))
@@ -136,14 +137,14 @@ def compare(
     for i, one in enumerate(map(resolved, case.expect)):
         if one.of in measured and not _is_measured(one, measured[one.of]):
             got = f"{one.metric}.{one.statistic} of {one.of}, which has no surface"
-            raise InputError(join(case.place, f"expect[{i}]"), got, "a measure of lines")
+            raise InputError(join(case.place, f"expect[{i}]"), got, "a measure that needs no surface")
     verdicts = tuple(
         verdict(expectation.model_copy(update={"of": name}), measured[name], reference.numbers)
         for expectation in map(resolved, case.expect)
         for name in (deviations if expectation.of == "candidates" else [expectation.of])
         if _is_measured(expectation, measured.get(name, ()))
     )
-    if reference.outcome.status == "denied":  # then it is not a truth
+    if reference.outcome.status == "denied":  # a denied reference is not a truth
         verdicts = tuple(
             replace(one, word="fail" if one.expectation.of == "reference" else "inconclusive") for one in verdicts
         )
@@ -170,7 +171,7 @@ def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
 
 
 def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:
-    """True if the expected measure is among ``measures``; a run without a surface lacks many."""
+    """True if the expected measure is among ``measures``; a run without a surface lacks many measures."""
     return find(measures, expectation.metric, str(expectation.statistic)) is not None
 
 

@@ -1,4 +1,4 @@
-"""Studies of the cost of accuracy on cases: points of error and cost, as pages show and files store them."""
+"""Studies of the cost of accuracy: points of error and cost by case, as shown on pages and stored in files."""
 
 import math
 import operator
@@ -20,15 +20,15 @@ _LEAST, _MOST, _FINEST = 1e-9, 1e15, 20
 # The features by which recommendations compare cases; features used as divisors are above zero.
 FEATURES = ("size", "triangles", "motion", "contact", "bulk_to_shear", "fibres_to_shear", "tet_size", "refinements")
 _ABOVE_ZERO = ("size", "triangles", "tet_size")
-_WANT = "a study as the verb study writes it"
+_WANT = "a study written by the verb study"
 
 
 @dataclass(frozen=True, eq=False)
 class CaseStudy:
-    """The points of a case. ``units`` of errors, and ``bars``, the error bars of the truth, by ``metric.statistic``;
-    ``truth``: its description; ``claims``: error bars of coarser members with their errors; ``triangles``; ``travel`` [mm], the
-    greatest displacement of the truth; ``features`` of the case, as far as its scene states them (:mod:`studies.features`);
-    ``truth_key``: the folder of the truth's run in a store, "" if it is not known.
+    """The points of a case. ``units`` of errors, and ``bars``, the error bars of the truth, by ``metric.statistic``; ``truth``: its
+    description; ``claims``: error bars of coarser references, with their errors; ``triangles``: their number on the surface;
+    ``travel`` [mm]: the greatest displacement of the truth; ``features`` of the case, as far as its scene states them
+    (:mod:`studies.features`); ``truth_key``: the folder of the truth's run in a store, "" if it is not known.
     """
 
     case: str
@@ -68,7 +68,7 @@ class CaseStudy:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Studies of cases; ``missing``: by case, the reason of omission; ``origin``: provenance of the measurements."""
+    """Studies of cases; ``missing``: by case, the reason for its omission; ``origin``: provenance of the measurements."""
 
     cases: tuple[CaseStudy, ...]
     missing: dict[str, str] = field(default_factory=dict)
@@ -138,10 +138,10 @@ def _check_scene(scene: Any, place: str) -> None:
         raise InputError(place, repr(scene), "a table of keys")
     for key in TETRAHEDRA if {*TETRAHEDRA} & {*scene} else ():
         if key not in scene:
-            raise InputError(f"{place}.{key}", "nothing", f"this key beside the other of {' and '.join(TETRAHEDRA)}")
+            raise InputError(f"{place}.{key}", "nothing", f"this key, as {' and '.join(TETRAHEDRA)} go together")
         try:
             size = float(str(scene[key]).removesuffix(" mm"))
         except ValueError:
             size = math.nan
         if not size >= 0:
-            raise InputError(f"{place}.{key}", f'"{scene[key]}"', 'a size such as "8 mm", or how often it is refined')
+            raise InputError(f"{place}.{key}", f'"{scene[key]}"', 'a size such as "8 mm", or a number of refinements')

@@ -56,7 +56,7 @@ class Beside:
     """A value of the model compared with a known value, both in ``unit``. ``truth``: the known value; ``within``: its uncertainty;
     ``n``: the number of specimens, None if unknown. ``validates``: True if agreement counts as validation. ``rests_on``: the text
     in which the truth was read, and the unmeasured parts of truth or model. ``kind``: measurement, or model if another model is the
-    truth. ``is_order``: True for an order, which is met (1) or not (0), to a half.
+    truth. ``is_order``: True for an order of stiffness, whose value is 1 if it is met and 0 if not, within 0.5.
     """
 
     name: str
@@ -84,7 +84,7 @@ def count(several: Iterable[Beside], kind: Kind) -> tuple[int, int]:
 @dataclass(frozen=True, eq=False)
 class Row:
     """A quantity with its evidence: the ``kinds`` of catalogue entries that verify it and the ``orders`` that they must show; the
-    ``band`` of facts, least and greatest; the comparisons with experiments (``beside``).
+    least and the greatest fact of its ``band``; and its comparisons with experiments (``beside``).
     """
 
     claim: Evidence
@@ -100,7 +100,7 @@ class Row:
 
     @property
     def models(self) -> tuple[int, int]:
-        """The number of other models within their tolerance, and of all other models, which are no evidence about muscles."""
+        """The number of other models within their tolerance, and of all other models, which are not evidence about muscles."""
         return count(self.beside, "model")
 
     @property
@@ -122,7 +122,7 @@ class Row:
     @property
     def grade(self) -> Grade:
         """The grade: "outside" if one measurement is not met, else "validated" if some measurement counts as validation, else
-        "indicative". Without a known experiment it is "verified only", without its data "not measured". Other models do not count.
+        "indicative"; "verified only" without a known experiment, "not measured" without its results. Other models do not count.
         """
         met, of = self.measured
         if of == 0:
@@ -165,13 +165,13 @@ def of_result(found: Result) -> Beside:
         *(entry.name, entry.title, entry.unit, found.finding.value, found.truth, found.within, n, met, counted),
         experiment=facts[0].experiment if facts else "",
         rests_on=_rests_on(facts, is_order=entry.is_order, from_memory=entry.from_memory),
-        remark=" ".join([*coarser, *filter(None, [found.finding.note]), f"Beside: {entry.source}."]),
+        remark=" ".join([*coarser, *filter(None, [found.finding.note]), f"Compared with: {entry.source}."]),
         is_order=entry.is_order,
     )
 
 
 def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> str:
-    """The least reliable text in which ``facts`` were read, with notes: a tolerance of ours, a part of the model from memory."""
+    """The least reliable text in which ``facts`` were read, and notes on a tolerance chosen here and a model from memory."""
     read = max((one.read_in for one in facts), key=_READ.index, default="not known")
     chosen = not is_order and not (facts and all(one.sd for one in facts))
     remembered = from_memory and all(one.doi_confirmed == "yes" for one in facts)
@@ -184,9 +184,7 @@ def of_arms(arms: ArmsBeside) -> Beside:
     """
     others_reach = reached(arms)
     words = "poses with the measured arm inside the fibres' range" if arms.is_curve else "overlap with a model's range"
-    title = (
-        f"{arms.muscle.replace('_', ' ').capitalize()}, {arms.sense}: {words} ({arms.case} beside {arms.experiment})"
-    )
+    title = f"{arms.muscle.replace('_', ' ').capitalize()}, {arms.sense}: {words} ({arms.case} and {arms.experiment})"
     share, truth = 100 * arms.share, _WHOLE if arms.kind == "measurement" else others_reach
     others = f"; fibres of another model of this body reach {others_reach:g} %" if arms.kind == "measurement" else ""
     return Beside(
@@ -195,7 +193,7 @@ def of_arms(arms: ArmsBeside) -> Beside:
         experiment=arms.experiment,
         rests_on="quotation, digitised; no ± known",
         remark=f"bias {arms.bias:.1f} mm, scatter {arms.scatter:.1f} mm over the {arms.known} of {len(arms.found.angles)} poses in "
-        f"which the published arm is known; {arms.setting}, on larger ones the mean arm differs by {arms.coarser:.1f} mm{others}",
+        f"which the published arm is known; {arms.setting}; with larger ones the mean arm changes by {arms.coarser:.1f} mm{others}",
         kind=arms.kind,
     )
 
@@ -209,8 +207,8 @@ def reached(arms: ArmsBeside) -> float:
 @dataclass(frozen=True)
 class Fitted:
     """The best fit of a ``law`` to the quantities of cubes named in ``to``: its ``parameters`` by name with the published range,
-    None if none is known, and the ``values`` of all quantities by name; ``converged``: True if the fit ended at a least sum of
-    squares, False if its ``evaluations`` ran out before.
+    None if none is known, and the ``values`` of all quantities by name; ``converged``: True if the fit ended at a minimum of the
+    sum of squares, False if its ``evaluations`` ran out first.
     """
 
     law: str
@@ -229,7 +227,7 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class Credibility:
-    """The evidence of all quantities: ``rows``; moment ``arms``; ``missing``: why a case has none; ``fits`` of laws to cubes."""
+    """The evidence of all quantities: ``rows``; moment ``arms``, or why a case has none (``missing``); ``fits`` of laws."""
 
     rows: tuple[Row, ...]
     arms: tuple[ArmsBeside, ...]

@@ -10,9 +10,7 @@ from fem_reference.runs.store import Run
 
 # Prefixes of statistics that are the value at one place, each with the prefix of the average over places.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
-_LEAST = (
-    0.5  # averages of changes differ by at least this share of the distance of the runs: a smaller difference is chance
-)
+_LEAST = 0.5  # averages of changes differ by at least this share of the distance between the runs: a smaller difference is chance
 _MOVED = 0.01  # below this share of a surface's greatest motion, ratios to the motion have no meaning
 
 
@@ -31,8 +29,8 @@ def ratio(differences: Floats, scale: Floats) -> float:
 
 def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> Floats:
     """The size (f,) of signed ``differences`` (f,) of a statistic between two runs whose surfaces are ``apart`` (f,) [mm]: at least
-    the distance times the average ratio of difference to distance over the frames. A difference that crosses zero is no evidence of
-    a small error in that frame. If the surfaces are equal the size is 0.
+    the distance times the average ratio of difference to distance over the frames. A difference that crosses zero does not
+    show that the error is small in that frame. If the surfaces are equal, the size is 0.
 
     If the motion ``moved`` (f,) [mm] of the surfaces is given, the distance counts as at least the motion times the median ratio
     of distance to motion: in some poses two meshes agree better by chance.
@@ -59,8 +57,8 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
 
     By the triangle inequality, changes of the same places differ by at most their deviation. They differ by less, as most of the
     deviation is not along the displacement, or cancels. A single statistic does not show by how much less: its difference may be
-    small by chance, most of all at the worst place. A quantile or a greatest value belongs to one place, wherever it is: nothing
-    cancels there, and no quantile of the deviation bounds it. So its difference counts as at least the rms distance of places.
+    small by chance, especially at the worst place. A quantile or a greatest value belongs to one place, wherever it is: nothing
+    cancels there, and no quantile of the deviation bounds it. So its difference counts as at least the rms distance over places.
     """
     metrics = [metric for metric, _ in names]
     shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]

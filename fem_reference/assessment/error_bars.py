@@ -1,6 +1,6 @@
 """Error bars of every statistic, frame by frame, from further solutions of the reference with coarser numerics.
 
-There are two sorts of bars. The bar of a candidate's deviation from the reference is the deviation of the reference's runs from
+There are two kinds of bars. The bar of a candidate's deviation from the reference is the deviation of the reference's runs from
 each other: by the triangle inequality, another reference changes the candidate's deviation by at most this amount. The bar of the
 reference's change from rest is the share of these deviations by which the changes of its runs differ. The bars of a body are
 differences of its states.
@@ -48,7 +48,7 @@ _Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is No
 _Numbers = Annotated[
     Floats, PlainValidator(lambda values: np.array(TypeAdapter(list[_Number]).validate_python(values)))
 ]
-# By sort of bar, the differences (f,) of each statistic between two runs.
+# By kind of bar, the differences (f,) of each statistic between two runs.
 _Differences = dict[Of, list[Floats]]
 
 
@@ -60,7 +60,7 @@ class ErrorBar:
 
     ``model`` (f,): the change of the statistic by another model of spring attachments: by exact attachments if these were solved,
     and for a force or moment at least ``SPREAD`` of its value; NaN where exact attachments could not be solved, None if there are
-    no springs or it was not asked for. This is no error of the present model, so ``values`` leave it out.
+    no springs or no other model was solved. This is not an error of the present model, so it is not part of ``values``.
     """
 
     of: Of
@@ -79,8 +79,8 @@ class ErrorBar:
 
 @dataclass(frozen=True, eq=False)
 class ErrorBars:
-    """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of two ``sizes`` [mm], those of the reference
-    first, with a general ``order`` assumed for the error in the size.
+    """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of two ``sizes`` [mm], the size of the
+    reference first, with a general ``order`` assumed for the error in the size.
     """
 
     numbers: tuple[int, ...]

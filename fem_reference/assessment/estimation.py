@@ -16,8 +16,8 @@ class CurveError:
 
 @dataclass(frozen=True)
 class HeightError:
-    """Heights of an attached area over its plane by Gaussians with ``centres`` of a ``choice``, fitted to every second vertex: the
-    error [mm] at the other vertices, and the condition number of the matrix.
+    """A fit of the heights of an attached area over its plane, at every second vertex, by Gaussians with a number of ``centres`` of
+    a ``choice``: the error [mm] at the other vertices, and the condition number of the matrix.
     """
 
     case: str
@@ -78,7 +78,7 @@ class RodError:
 @dataclass(frozen=True)
 class AnswerChange:
     """The change of the reference's result with fibres of a ``source`` instead of ``against``: by ``metric.statistic`` the greatest
-    over the frames, empty if a solution is missing (``status``); ``bars``: the error bars of the result.
+    change over the frames, empty if a solution is missing (``status``); ``bars``: the error bars of the result.
     """
 
     case: str
@@ -91,7 +91,7 @@ class AnswerChange:
 
 @dataclass(frozen=True)
 class Estimation:
-    """The errors of all techniques; ``missing``: by case, the reason of omission; ``answers``, if these were requested."""
+    """The errors of all techniques; ``missing``: by case, the reason for its omission; ``answers``, if requested."""
 
     curves: tuple[CurveError, ...]
     heights: tuple[HeightError, ...]

@@ -40,14 +40,14 @@ class Fact(Record):
 
     @property
     def validates(self) -> bool:
-        """True if it was read in the publication or its abstract and has a deviation over several specimens."""
+        """True if it was read in the publication or its abstract and has a standard deviation over several specimens."""
         read = self.read_in in ("publication", "abstract") and self.how not in ("fit", "memory")
         return read and self.sd is not None and (self.n or 0) > 1
 
 
 class Experiment(Record):
-    """An experiment of a ``kind``: measurement, model, or bands (numbers of several publications). Its ``specimen``, its
-    ``boundary`` conditions, the parts that our scene repeats and does not repeat; ``file``: a full curve, in the folder of
+    """An experiment of a ``kind`` (measurement, model, or bands from several publications), with its ``specimen``, its ``boundary``
+    conditions, and the parts of it that a scene has ``repeated`` and ``not_repeated``. ``file``: a full curve, in the folder
     ``FEM_REFERENCE_DATA``.
     """
 
@@ -97,7 +97,7 @@ def find(experiment: str, quantity: str, condition: str) -> Fact:
         one for one in _own() if (one.experiment, one.quantity) == (experiment, quantity) and condition in one.condition
     ]
     if len(found) != 1:
-        raise LookupError(f"{len(found)} facts of {experiment}, {quantity}: {condition}")
+        raise LookupError(f"{len(found)} facts of {experiment}, {quantity} instead of one: {condition}")
     return found[0]
 
 

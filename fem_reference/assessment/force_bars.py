@@ -1,7 +1,7 @@
 """Error bars of the force on each bone and of its moment about the origin, as lengths of vectors.
 
-The rule is the same as for ``joint_moment``. The difference of two runs is the length of the difference of their vectors, so no
-component has a short bar as it crosses zero. Two bones between which a muscle is in balance have the same bars.
+The rule is the same as for ``joint_moment``. The difference of two runs is the length of the difference of their vectors, so the
+bar is not too short where a component crosses zero. Two bones between which a muscle is in balance have the same bars.
 """
 
 import numpy as np

@@ -15,7 +15,7 @@ from pydantic import Field
 # The costs of a point: by name a title and its unit. The first is the default.
 COSTS: dict[str, tuple[str, str]] = {
     "seconds_per_frame": ("time of a frame", "s"),
-    "seconds": ("whole time, with set-up", "s"),
+    "seconds": ("total time, with set-up", "s"),
     "seconds_processor": ("processor time", "s"),
     "unknowns": ("unknowns", ""),
     "newton_iterations": ("Newton iterations", ""),
@@ -39,7 +39,7 @@ _LEAST_POINTS, _LEAST_SPAN = 2, 1.3
 class Point:
     """A ``solver`` with settings, run on a ``case``: the varied key (``knob``, "" for the settings of the case or the default) and
     its ``value`` as text; ``choice``: everything needed to repeat it; its outcome. ``errors``: by ``metric.statistic``, the
-    greatest deviation from the truth over the frames; ``costs``: the known ones of ``COSTS`` by name, and seconds by phase.
+    greatest deviation from the truth over the frames; ``costs``: the known costs of ``COSTS`` by name, and seconds by phase.
     """
 
     case: str
@@ -71,11 +71,11 @@ class Point:
 
     @property
     def load(self) -> float:
-        """The share of the machine that other processes kept busy during its run; NaN if that is not known."""
+        """The share of the machine that other processes kept busy during its run; NaN if it is unknown."""
         return self.costs.get(LOAD, math.nan)
 
     def at(self, error: str, cost: str) -> tuple[float, float] | None:
-        """Its error and its cost, None if one is not known or not above zero."""
+        """The error and the cost of the point, None if either is unknown or not above zero."""
         pair = self.errors.get(error, math.nan), self.costs.get(cost, math.nan)
         return pair if self.status == "converged" and min(pair) > 0 and all(map(math.isfinite, pair)) else None
 
@@ -93,9 +93,9 @@ def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
 
 @dataclass(frozen=True)
 class Price:
-    """The price of accuracy of a ``solver``: ``factor``, the cost at half an error over the cost at the error, on its front, NaN if
-    more cost does not reduce the error; the ``best`` and ``worst`` errors of the front, which has ``count`` points; ``nearest``:
-    the point with the best error.
+    """The price of accuracy of a ``solver``: ``factor``, the ratio of the cost at half an error to the cost at the error, on its
+    front, NaN if more cost does not reduce the error; the ``best`` and ``worst`` errors of the front, which has ``count`` points;
+    ``nearest``: the point with the best error.
     """
 
     solver: str
@@ -107,7 +107,7 @@ class Price:
 
     @property
     def is_measured(self) -> bool:
-        """True if the front includes half the error, so that its factor is no extrapolation."""
+        """True if the errors of the front span a factor of two, so that :attr:`factor` is not extrapolated."""
         return self.worst >= 2 * self.best
 
 
@@ -140,7 +140,7 @@ class Match:
 
 
 def match(points: Iterable[Point], error: str, cost: str, *, same: str, at: float) -> Match:
-    """The best point of each solver whose error or cost ``same`` is at most ``at``; of equally good points the one with less."""
+    """The best point of each solver whose error or cost ``same`` is at most ``at``; on equality, the point with less of it."""
     i = 0 if same == error else 1
     known = [(pair, point) for point in points if (pair := point.at(error, cost)) and pair[i] <= at]
     best = dict[str, Point]()

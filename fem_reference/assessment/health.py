@@ -170,7 +170,7 @@ def _deepest(run: Followed, depths: Floats) -> Found:
 
 
 def pierced(run: Followed) -> Found:
-    """Greatest depth of a vertex of a bone in the body, in per cent of its size; thin bones fit between vertices of the body."""
+    """Greatest depth of a vertex of a bone in the body, in per cent of the body's size, as thin bones fit between its vertices."""
     values, places = np.zeros(len(run.numbers)), np.tile(run.surface.points[0], (len(run.numbers), 1))
     for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
         body = run.surface.moved_to(points)
@@ -185,7 +185,7 @@ def pierced(run: Followed) -> Found:
 
 def crossed(run: Followed) -> Found:
     """Greatest depth to which bodies, or parts of one body, penetrate each other, in per cent of the size: 0 if an exact test finds
-    no intersecting triangles of their surfaces; for one body, none that do not already intersect at rest.
+    no intersecting triangles of their surfaces; for one body, triangles that intersect at rest are ignored.
     """
     values, places = np.full(len(run.numbers), np.nan), np.tile(run.surface.points[0], (len(run.numbers), 1))
     for i, finite in enumerate(np.isfinite(run.positions).all(axis=(1, 2))):

@@ -16,7 +16,7 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
 
 Word = Literal["pass", "doubtful pass", "fail", "inconclusive", "not judged"]
-# Verdicts with which commands end with 0: the expectation is met, not judged, or inconclusive.
+# Verdicts that count as met.
 MET: tuple[Word, ...] = ("pass", "doubtful pass")
 _KINDS = {
     "mm": ("a length", 1.0),
@@ -90,13 +90,13 @@ def doubts(reference: Run) -> list[str]:
     outside = np.nan_to_num(reference.scalars.get("outside_law", np.zeros(0))) > 0
     if outside.any():
         where = f"in {int(outside.sum())} of {len(outside)} frames, first in {reference.numbers[int(outside.argmax())]}"
-        said.append(f"cells are outside the range that a law is meant for {where}: see Provenance")
+        said.append(f"cells are outside the intended range of a law {where}: see Provenance")
     gaps = np.nan_to_num(reference.scalars.get("energy_gap", np.zeros(0)))
     if (np.abs(gaps) > ENERGY_GAP).any():
         most = int(np.argmax(np.abs(gaps)))
         said.append(
-            f"{100 * gaps[most]:.3g} % of the energy without work at frame {reference.numbers[most]}: the body jumped, or the load "
-            "steps are too large to decide (largest_step)"
+            f"the energy changed by {100 * gaps[most]:.3g} % without work at frame {reference.numbers[most]}: the body jumped, or "
+            "the load steps are too large to decide (largest_step)"
         )
     return said
 

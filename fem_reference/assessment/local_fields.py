@@ -1,4 +1,4 @@
-"""Quantities of runs at every vertex and fibre point, by frame, as colours of a view and for ParaView."""
+"""Quantities of runs at every vertex and fibre point, by frame, for the colours of a view and for ParaView."""
 
 import numpy as np
 
@@ -41,7 +41,7 @@ def to_bones(run: Run, context: MeasurementContext) -> Floats | None:
 
 
 def stretch_along(lines: Polylines, positions: Floats) -> Floats:
-    """Stretch (f, m) at the points of ``lines`` moved to ``positions`` (f, m, 3) [mm]: of the pieces that meet at a point."""
+    """Stretch (f, m) at the points of ``lines`` moved to ``positions`` (f, m, 3) [mm], of the pieces that meet at each point."""
     count = len(lines.points)
     joined = np.ones(count - 1, bool)  # True where a piece joins a point with the next
     joined[lines.offsets[1:-1] - 1] = False

@@ -11,7 +11,7 @@ from fem_reference.assessment.experiments import Kind
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 
-# As Modenese and Kohout 2020, doi 10.1007/s10439-020-02490-4.
+# As in Modenese and Kohout 2020, doi 10.1007/s10439-020-02490-4.
 DEGREE, STEP = 4, 2.0
 
 
@@ -41,7 +41,7 @@ def fitted_arms(angles: Floats, lengths: Floats, at: Floats) -> Floats:
     [mm] of k fibres at ``angles`` (f,) [deg] best. InputError if too few angles differ.
     """
     if len(np.unique(np.round(angles, 9))) <= DEGREE:
-        raise InputError("angles", f"{len(np.unique(angles))} of them", f"more than {DEGREE} that differ")
+        raise InputError("angles", f"{len(np.unique(angles))} different angles", f"more than {DEGREE}")
     slopes = [Polynomial.fit(angles, length, DEGREE).deriv()(at) for length in lengths.T]
     return np.asarray(-np.stack(slopes, axis=1) * 180 / np.pi)
 
@@ -110,7 +110,7 @@ class ArmsBeside:
 
     @property
     def scatter(self) -> float:
-        """The standard deviation of that difference over the poses [mm]; NaN for none."""
+        """The standard deviation of the difference in :attr:`bias` over the poses [mm]; NaN for none."""
         return float(self._off.std()) if self._off.size else float("nan")
 
     @property

@@ -14,7 +14,7 @@ from fem_reference.problems.cubes import FREE, CubeState, loaded
 Material = tuple[Effect, ...]
 SQUEEZED, STRETCHED = 0.9, 1.1
 _CLEAR = 0.01  # the share by which the stiffness in a direction must differ to count as softer or stiffer
-# That of the case hip_flexion, after Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
+# The volume law of the case hip_flexion, after Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 VOLUME = make("incompressible_penalty", bulk="10 MPa")
 FIBRES = {"stress": 0.3, "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
 SHIPPED: Material = (make("neo_hooke", mu=0.01), VOLUME, make("fibre_passive", **FIBRES))
@@ -24,7 +24,7 @@ SHIPPED: Material = (make("neo_hooke", mu=0.01), VOLUME, make("fibre_passive", *
 class Quantity:
     """A measured quantity of a cube: its ``truth`` in ``unit`` from ``facts`` of an ``experiment``, its uncertainty ``within`` and
     the reason for it (``because``); ``of``: its value for a material. ``limit``: the reason why the shipped law cannot reach the
-    truth. ``is_order``: True for an order, which is met (1) or not (0), to a half.
+    truth. ``is_order``: True for an order of stiffness, whose value is 1 if it is met and 0 if not, within 0.5.
     """
 
     name: str
@@ -82,7 +82,7 @@ def confinement(material: Material) -> float:
 
 
 def both_orders(material: Material) -> float:
-    """1 if the cube is stiffer along its fibres in compression and stiffer across them in tension, by 1 % and more, else 0."""
+    """1 if the cube is stiffer along its fibres in compression and stiffer across them in tension, by at least 1 %, else 0."""
     squeezed, stretched = (stiffness_ratio(stretch)(material) for stretch in (SQUEEZED, STRETCHED))
     return float(squeezed > 1 + _CLEAR and stretched < 1 - _CLEAR)
 
@@ -93,7 +93,7 @@ _TENSION_ONLY = (
     "Fibres that pull in tension only are slack in compression along them, where the matrix alone resists; across the load they "
     "are stretched and resist."
 )
-_BARE = "Fibres resist in tension along them, and nothing but the matrix resists across."
+_BARE = "Fibres resist tension along them, and only the matrix resists across them."
 
 
 def _squeezed(name: str, title: str, condition: str, degrees: float, axis: int) -> Quantity:
@@ -116,8 +116,8 @@ def _ratio_by_symmetry() -> Quantity:
     along, across = (find(LOOCKE, "poisson_ratio", words) for words in ("both strains across", "strain along them"))
     truth = along.value / across.value
     within = truth * math.hypot(0.05 / along.value, 0.05 / across.value)
-    because = "The ratio of two Poisson ratios, 0.5 and 0.36, each known to 0.05."
-    title = "Cube in compression: stress along the fibres over that across them"
+    because = "The ratio of two Poisson ratios, 0.5 and 0.36, each known to within 0.05."
+    title = "Cube in compression: stress along the fibres over stress across them"
     of = stiffness_ratio(SQUEEZED)
     return Quantity("cube_stiffness_ratio", title, LOOCKE, of, (along, across), truth, within, because, _TENSION_ONLY)
 
@@ -128,13 +128,13 @@ def _confinement() -> Quantity:
     because = (
         "The standard deviation of the ratio of two stresses, -36.7 and -7.7 kPa; their strain is not in the abstract."
     )
-    title = "Semi-confined compression, fibres lengthen: stress over that of unconfined compression across the fibres"
+    title = "Semi-confined compression, fibres lengthen: stress over stress in unconfined compression across the fibres"
     return Quantity("cube_confinement", title, WALTER, confinement, facts, truth, sd, because)
 
 
 def _tension() -> Quantity:
     facts = tuple(find(TAKAZA, "axial_stress", f"{words} the fibres") for words in ("along", "across"))
-    title = "Strip at a stretch of 1.1: stress along the fibres over that across them"
+    title = "Strip at a stretch of 1.1: stress along the fibres over stress across them"
     because = "Both stresses are from memory, without deviations: the tolerance is the ratio itself."
     truth = facts[0].value / facts[1].value
     of = stiffness_ratio(STRETCHED)
@@ -142,7 +142,7 @@ def _tension() -> Quantity:
 
 
 def _order(name: str, title: str, fact: Fact, of: Callable[[Material], float], limit: str = "") -> Quantity:
-    because = "An order: 1 where it is met by 1 % or more, else 0."
+    because = "An order: 1 if it is met by at least 1 %, else 0."
     title = f"Cube in compression: {title}"
     return Quantity(name, title, fact.experiment, of, (fact,), 1.0, 0.5, because, limit, is_order=True)
 

@@ -1,4 +1,4 @@
-"""Omissions of an effect of a scene or a feature of a solver: their changes, compared with the error bar, and their savings."""
+"""Omissions of effects of a scene or features of a solver: the changes, compared with the error bar, and the time saved."""
 
 import math
 from collections.abc import Mapping
@@ -21,8 +21,8 @@ Word = Literal["matters", "hardly", "does not matter", "not known"]
 
 @dataclass(frozen=True)
 class Omission:
-    """A run and its outcome. ``left_out``: names of the omitted effects or features (none, one, or all that can be omitted).
-    ``instead``: settings that had to change with them. A run that was not made has the status ``"refused"``.
+    """A run and its outcome. ``left_out``: names of the omitted effects or features (none, one, or all that can be omitted);
+    ``instead``: settings that had to change because of this. A run that was not made has the status ``"refused"``.
 
     ``changes``: by ``metric.statistic``, the greatest magnitude over the frames of the change from the complete run; left out if
     unknown in a frame. ``predicted``: the value of an indicator, if any, by ``metric.statistic``. ``costs``: as in the run.
@@ -49,7 +49,7 @@ class Omission:
 
 @dataclass(frozen=True)
 class Ablation:
-    """Runs ``name`` by ``solver``: the complete one (``whole``), and one for each of ``omissions``; ``kept``: never left out."""
+    """Runs ``name`` by ``solver``: the complete run (``whole``), and a run for each of ``omissions``; ``kept``: never omitted."""
 
     name: str
     solver: str
@@ -92,7 +92,7 @@ def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str
 
 
 def verdict(changes: Mapping[str, float], bars: Mapping[str, float]) -> Word:
-    """Judge an omission: it matters if one of ``changes`` exceeds its error bar, and does not if all are below a tenth of it.
+    """Judge an omission: it matters if one of ``changes`` exceeds its error bar, and does not if all are below a tenth of theirs.
 
     >>> bars = {"volume.deviation": 0.1, "surface_deviation.rms": 1.0}
     >>> [verdict({"volume.deviation": 0.005, "surface_deviation.rms": x}, bars) for x in (0.05, 0.5, 5.0)]

@@ -122,7 +122,7 @@ def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], met
         raise InputError(case, "bones that do not move", "a study of the case itself: fem-reference study makes one")
     found = [study for study in studies if study.features["motion"] > 0]
     if not found:
-        raise InputError("studies", "none of a case whose bones move", f"one, or a study of {case} itself")
+        raise InputError("studies", "none of a case whose bones move", f"such a study, or a study of {case} itself")
     return found
 
 
@@ -157,7 +157,7 @@ def _measured(study: CaseStudy, metric: str) -> list[Expected]:
 
 
 def _expected(features: Features, studies: Sequence[CaseStudy], metric: str, margins: Margins) -> Iterable[Expected]:
-    """The settings measured on all of the most similar cases: the worst errors, scaled by motion, and times, by triangles."""
+    """The settings measured on all of the most similar cases: worst errors, scaled by motion, and times, scaled by triangles."""
     chosen = alike(features, studies)
     by_key = [
         {setting(one.point, study): one for one in _measured(study, metric) if is_elsewhere(one.point)}
@@ -185,7 +185,7 @@ def _is_share(metric: str) -> bool:
 
 
 def _translated(point: Point, study: CaseStudy, features: Features) -> Point:
-    """A point of a study for another case: tetrahedra relative to the case's, doubled in size for each refinement below zero."""
+    """A point of a study with its tetrahedra scaled to another case, and doubled in size for each refinement below zero."""
     scene = dict(point.choice.get("scene", {}))
     if not set(TETRAHEDRA) <= set(scene):
         return point

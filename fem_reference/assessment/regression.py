@@ -79,7 +79,7 @@ class Judgement:
             return "the baseline has no limit for the distance from the reference; --update adds it, now that there is an error bar"
         known = "the reference" if self.question == "within" else "the baseline"
         text = f"{known} has an error bar of {self.known:.4g} {self.unit}"
-        return f"{text}, and {self.away:.4g} {self.unit} is within it of the {self.allowed:.4g} {self.unit} allowed"
+        return f"{text}; {self.away:.4g} {self.unit} differs from the allowed {self.allowed:.4g} {self.unit} by less"
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class _Frames(NamedTuple):
 def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
     """Judge whether the sampled vertices are unchanged, by the greatest distance [mm] of each frame."""
     was = positions.points(len(current.rest), "baseline")
-    with np.errstate(over="ignore"):  # squares of huge distances, which count as infinite
+    with np.errstate(over="ignore"):  # squares of huge distances overflow and count as infinite
         away = np.linalg.norm(current.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
     still = np.where(np.isnan(was).any(axis=(1, 2)), np.nan, 0.0)
     frames = _Frames(still, away, still, np.full(len(away), POSITION_ROUNDING))
@@ -177,7 +177,7 @@ def _notes(baseline: Baseline, current: CurrentMeasures, found: list[Judgement])
     if baseline.fem_reference != __version__:
         yield f"measured by fem_reference {__version__}, the baseline by {baseline.fem_reference}"
     if baseline.reference != current.reference_name:
-        yield f"the reference is {current.reference_name}, that of the baseline was {baseline.reference}"
+        yield f"the reference is {current.reference_name}, but the reference of the baseline was {baseline.reference}"
     changed = any(one.word == "fail" and one.question == "unchanged" for one in found if one.name != MOVED)
     if changed and all(one.word == "pass" for one in found if one.name == MOVED):
         yield (

@@ -55,12 +55,12 @@ class RunCheck:
 
     @property
     def met(self) -> bool:
-        """True if the value is allowed; never for a value that is not a number."""
+        """True if the value is allowed; False for a value that is not a number."""
         return self.value <= self.allowed
 
     @property
     def share(self) -> float:
-        """The value over the allowed one; infinite where either is not a number, or the value is above an allowed 0."""
+        """The value over the allowed value; infinite if either is not a number, or the value is above an allowed 0."""
         return math.inf if math.isnan(share := self.value / (self.allowed or 1e-300)) else share
 
     def __str__(self) -> str:
@@ -75,7 +75,7 @@ Nodes = Callable[[int], Floats | None]
 
 
 def of_body(body: Body, solved: Run) -> RunChecks:
-    """Check that states exist and are finite, agree with exact prescriptions, and that parts that may touch do not cross."""
+    """Check that states exist, are finite and agree with exact prescriptions, and that parts that may touch do not cross."""
     numbers, points = tuple(state.number for state in solved.states), [state.points for state in solved.states]
     found = (_complete(body.frames, numbers), _finite(numbers, points))
     if not all(one.met for one in found):
@@ -84,7 +84,7 @@ def of_body(body: Body, solved: Run) -> RunChecks:
 
 
 def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
-    begun = body.start is not None  # then the first state is prescribed
+    begun = body.start is not None  # if so, the first state is prescribed
     for state in solved.states[1:] if begun else solved.states:
         for entry in body.prescribed:
             if entry.stiffness is None and isinstance(entry.on, str):
@@ -98,7 +98,7 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch. Allowed: smoothing, pressure over stiffness, overlap between points and left from rest."""
+    """Overlap of parts that may touch; allowed by smoothing, compliance, gaps between points, and overlap remaining from rest."""
     for law in body.touching:
         apart, depth = longest_edge(body.mesh, law) / 4, partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
@@ -119,7 +119,7 @@ def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -
     found = (_complete(problem.frames, run.numbers), _finite(run.numbers, arrays))
     if not all(one.met for one in found):
         return found
-    if problem.start is not None:  # then the first state is prescribed
+    if problem.start is not None:  # if so, the first state is prescribed
         scalars = {name: values[1:] for name, values in run.scalars.items()}
         run = replace(run, numbers=run.numbers[1:], positions=run.positions[1:], scalars=scalars)
     attached = chain.from_iterable(_attached(problem, run, entry) for entry in problem.attached)
@@ -196,7 +196,7 @@ def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
                 continue
             travelled = _travel(bone, before, number) / float(counts[i])
             words, allowed, unit = ("turns", _TURN, "rad") if turns else ("slides", farthest, "mm")
-            yield RunCheck(f"{bone.name} {words} by load step", travelled, allowed, unit, number)
+            yield RunCheck(f"{bone.name} {words} per load step", travelled, allowed, unit, number)
 
 
 def _travel(bone: Bone, before: float, after: float) -> float:
@@ -209,7 +209,7 @@ def _travel(bone: Bone, before: float, after: float) -> float:
 
 def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     """The sums of forces and of moments that bones exert on the muscle, by attachments and contact: 0 without external loads, else
-    in balance with these. A user's own effect may be such a load, so there is no check with such effects.
+    in balance with these. A user's own effect may be a load, so there is no check with such effects.
     """
     residual = BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
     allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
@@ -266,7 +266,7 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 
 
 def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
-    """Penetration of a bone and the muscle; above the ``give`` only the excess over rest counts, and never to the bone's middle."""
+    """Overlap of a bone and the muscle. Above the ``give`` only the excess over rest counts. The bone's middle is never allowed."""
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:

@@ -1,4 +1,4 @@
-"""The second check of states that a solver calls converged. A run that it denies has status ``"denied"`` and is never a truth."""
+"""The second check of states that a solver calls converged. A run that it denies has the status ``denied`` and is never a truth."""
 
 import hashlib
 import logging
@@ -30,7 +30,7 @@ RECORD = "second_check"
 
 
 def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
-    """A converged ``outcome``, denied where one of the ``checks`` is not met."""
+    """A converged ``outcome``, denied if one of the ``checks`` is not met."""
     lost = [str(one) for one in checks if not one.met]
     if not lost or outcome.status != "converged":
         return outcome
@@ -38,7 +38,7 @@ def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
 
 
 def confirmed_run(problem: Callable[[], MuscleProblem | MusclesProblem], run: Run) -> Run:
-    """A converged ``run`` with its second check in the origin, stored with it; unchanged where it has the check of this code."""
+    """A converged ``run`` with its second check in the origin, stored with it; unchanged if it was checked by this code."""
     sources = b"".join(Path(str(one.__file__)).read_bytes() for one in (run_checks, neighbours, interpenetration))
     stored, code = run.origin.get(RECORD, {}), hashlib.sha256(sources).hexdigest()[:16]
     if stored.get("code") == code:
@@ -56,7 +56,7 @@ def confirmed_run(problem: Callable[[], MuscleProblem | MusclesProblem], run: Ru
 
 
 def _of_all(problem: MuscleProblem | MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
-    """The checks of a ``run`` of a muscle; of several muscles, those of each with its name, and that none is inside another."""
+    """The checks of a muscle's ``run``; for several muscles, the checks of each under its name, and that none is inside another."""
     if isinstance(problem, MuscleProblem):
         return of_muscle(problem, run, nodes)
     found = list[RunCheck]()
@@ -75,7 +75,7 @@ def _some(nodes: Nodes, points: slice, number: int) -> Floats | None:
 def confirmed_frames(
     problem: MuscleProblem | MusclesProblem, frames: Sequence[Frame], outcome: Outcome, settings: Record
 ) -> Outcome:
-    """The ``outcome`` of ``frames`` of muscles in memory, denied where the check denies that they converged."""
+    """The ``outcome`` of ``frames`` of muscles in memory, denied if the check denies that they converged."""
     if outcome.status != "converged":
         return outcome
     run = replace(collected(frames, outcome, problem.rest), origin={"settings": settings.model_dump(mode="json")})
@@ -84,14 +84,14 @@ def confirmed_frames(
 
 
 def texts_of(run: Run) -> tuple[str, ...]:
-    """The checks stored with a ``run``, in words, those that deny it first; empty for an unchecked one."""
+    """The checks stored with a ``run``, in words, the checks that deny it first; empty for an unchecked run."""
     found = run.origin.get(RECORD, {}).get("checks", [])
     texts = [str(RunCheck(**{key: value for key, value in one.items() if key != "met"})) for one in found]
     return tuple(text for met in (False, True) for text, one in zip(texts, found, strict=True) if one["met"] is met)
 
 
 def confirmed_body(body: Body, solved: Run) -> Run:
-    """A solution of a ``body``, denied where the check denies that it converged."""
+    """A solution of a ``body``, denied if the check denies that it converged."""
     if solved.outcome.status != "converged":
         return solved
     return replace(solved, outcome=confirmed(solved.outcome, (*of_body(body, solved), *worst(balance(body, solved)))))

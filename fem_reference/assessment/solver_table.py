@@ -48,7 +48,7 @@ def solver_kinds() -> tuple[SolverKind, ...]:
 
 
 def report_speeds() -> dict[str, ReportSpeed]:
-    """The iterations a second that the report's program makes, by case."""
+    """The iterations per second of the report's program, by case."""
     return {one.case: one for one in _file().report_speed}
 
 
@@ -60,7 +60,7 @@ def _file() -> _File:
 class SolverResult:
     """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] if known, and ``measures`` against
     the reference; for the reference itself its error bars, empty if these were not requested. ``needs``: the parameters that a user
-    must give, by kind; empty if that is not known. ``unsound``: the reason why its frames are no answer, else empty.
+    must give, by kind; empty if that is not known. ``unsound``: the reason why its frames are unusable, else empty.
     """
 
     kind: str
@@ -130,7 +130,7 @@ class Table:
         return list(dict.fromkeys(one.name for one in self.results if one.kind == kind))
 
     def needs(self, kind: str, name: str) -> Mapping[str, int]:
-        """The parameters that ``name`` needs on the scene with most of them; empty if that is not known."""
+        """The parameters that ``name`` needs on the scene that needs most; empty if they are not known."""
         found = [one.needs for one in self._by(kind, name)]
         return max(found, key=lambda needs: sum(needs.values()), default={})
 

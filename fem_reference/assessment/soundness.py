@@ -1,4 +1,4 @@
-"""Reasons why the frames of a candidate are no answer, although every number is finite; such a candidate is not ranked."""
+"""Reasons why the frames of a candidate are unusable, although every number is finite; such a candidate is not ranked."""
 
 import numpy as np
 
@@ -18,13 +18,13 @@ _STILL, _MOVES = 1e-6, 1e-2
 
 
 def unsound(run: Run, reference: Run) -> str:
-    """The first reason why the frames of a ``run`` are no answer, with its frame; else empty; also empty for a run without the
+    """The first reason why the frames of a ``run`` are unusable, with its frame; empty if there is none, and for a run without the
     reference's surface. Only frames that both runs reached count.
     """
     if not run.has_surface or run.positions.shape != reference.positions.shape:
         return ""  # a run of lines, or of another surface
     if run.outcome.status == "converged" and not np.isfinite(run.positions).all(axis=(1, 2)).any():
-        return "unknown: no frame without values that are not numbers"
+        return "unknown: every frame has values that are not numbers"
     both = np.isfinite(run.positions + reference.positions).all(axis=(1, 2))
     for i in np.flatnonzero(both):
         if why := _of_frame(run, run.positions[i], reference.positions[i]):
@@ -37,7 +37,7 @@ def _of_frame(run: Run, mine: Floats, truth: Floats) -> str:
     triangles, size = run.surface.triangles, diagonal(run.surface.points)
     away = float(np.linalg.norm(mine - truth, axis=1).max())
     if not away <= _FARTHEST * size:
-        return f"exploded: a vertex is {away:.3g} mm from the reference, the body {size:.3g} mm long"
+        return f"exploded: a vertex of a body of {size:.3g} mm is {away:.3g} mm from the reference"
     share = enclosed_volume(mine, triangles) / enclosed_volume(truth, triangles)
     if not _LEAST <= share <= _MOST:
         return f"{'exploded' if share > 1 else 'collapsed'}: {share:.3g} times the volume of the reference"
@@ -56,4 +56,5 @@ def _stuck(mine: Floats, truth: Floats) -> str:
     stuck = (moved < _STILL) & (wanted > _MOVES)
     if not stuck.any():
         return ""
-    return f"stuck: {stuck.sum()} vertices never move, by up to {wanted[stuck].max() * size:.3g} mm in the reference"
+    most = wanted[stuck].max() * size
+    return f"stuck: {stuck.sum()} vertices never move, but by up to {most:.3g} mm in the reference"

@@ -22,10 +22,10 @@ MATCHED_ERROR, MATCHED_TIME = 2.0, 0.1
 class Standing(Record):
     """A solver ``name`` of a ``group`` on a ``case``. ``worst``: by ``metric.statistic`` its greatest deviation over the frames,
     empty for the reference, which has ``bars``. ``from_rest``: rms distance [mm] of the last frame from the first, if the reference
-    is back at rest there. ``unsound``: the reason why its frames are no answer. ``split``: root mean squares [mm] of the parts
-    of its error. ``least_error``: the error [mm] if within the matched time; ``least_time``: the time [s] if within the matched
-    error. ``truth`` and ``run``: keys of the two runs; ``frames``: a hash of its positions; ``date``; ``stale``: True if case,
-    reference, solver, protocol or time limit changed since; ``time_limit``: its greatest processor time [s].
+    is back at rest there. ``unsound``: the reason why its frames are unusable. ``split``: root mean squares [mm] of the parts of
+    its error. ``least_error``: the error [mm], if the time is at most the matched time; ``least_time``: the time [s], if the error
+    is at most the matched error. ``truth``, ``run``: keys of the two runs; ``frames``: a hash of the positions. ``stale``: True if
+    case, reference, solver, protocol or time limit changed after the ``date``; ``time_limit``: the greatest processor time [s].
     """
 
     case: str
@@ -58,7 +58,7 @@ class Standing(Record):
 
     @property
     def ended(self) -> str:
-        """The end of the run in words: the reason why its frames are no answer, the limit that it exceeded, or its status."""
+        """The end of the run in words: the reason why its frames are unusable, the limit that it exceeded, or its status."""
         late = self.status == "timed out" and self.time_limit is not None
         return self.unsound or (f"not within {self.time_limit:g} s" if late else self.status)
 
@@ -138,9 +138,9 @@ def load(path: Path) -> tuple[Standing, ...]:
     """The rows of standings that were written to ``path``; none if there is no file. InputError for any other file."""
     if not path.exists():
         return ()
-    found = texts.read_json(path, "standings as the verb standings writes them")
+    found = texts.read_json(path, "standings written by the verb standings")
     if not isinstance(found, dict):
-        raise InputError(path, "no table", "standings as the verb standings writes them")
+        raise InputError(path, "no table", "standings written by the verb standings")
     return parse(Standings, found, str(path)).rows
 
 

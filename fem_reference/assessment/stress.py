@@ -110,8 +110,8 @@ Weighed = Sequence[tuple[Bound, History]]
 
 
 def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
-    """``cell``, for a run that reached every frame, with the verdict by its bounds: by the first violated bound, else the first of
-    all. A value that is not finite fails for any status; so does a ``contrast`` without the violation that it should show.
+    """``cell``, for a run that reached every frame, with the verdict by its first violated bound, else by the first bound. A
+    value that is not finite fails for any status; so does a ``contrast`` without the violation that it should show.
     """
     shown = _decisive(cell, weighed)
     if shown.value is None or shown.bound is None or not np.isfinite(shown.value):
@@ -119,19 +119,19 @@ def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
     kept = shown.value <= shown.bound
     if not contrast:
         return replace(shown, verdict="ok" if kept else "degraded")
-    said = f"{'though it should not be' if kept else 'as it should be'}, for {contrast}: {shown.sentence}"
+    said = f"{'not as expected' if kept else 'as expected'} ({contrast}): {shown.sentence}"
     return replace(shown, verdict="failed" if kept else "degraded", sentence=said)
 
 
 def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> Cell:
-    """``cell``, for a run that ended with another status: failed; or no solution if it ended at a limit point, or reached some
+    """``cell``, for a run that did not reach every frame: failed; or no solution if it ended at a limit point, or reached some
     frames of a case that has ``no_solution``, for the given reason.
     """
     shown = _decisive(cell, weighed)
     if cell.status == "limit point":
         return replace(shown, verdict="no solution", sentence=message)
     if no_solution and cell.status not in _OTHER_REASONS and len(weighed[0][1].numbers) > 1:
-        sentence = f"as it should, for {no_solution}: {cell.status}: {message}"
+        sentence = f"as expected ({no_solution}): {cell.status}: {message}"
         return replace(shown, verdict="no solution", sentence=sentence)
     return replace(shown, verdict="failed", sentence=f"{cell.status}: {message}")
 
@@ -141,9 +141,7 @@ def doubted(cell: Cell, doubt: str, no_solution: str) -> Cell:
     if not doubt or cell.verdict != "ok":
         return cell
     if no_solution:
-        return replace(
-            cell, verdict="no solution", sentence=f"as it should, for {no_solution}: {doubt}; {cell.sentence}"
-        )
+        return replace(cell, verdict="no solution", sentence=f"as expected ({no_solution}): {doubt}; {cell.sentence}")
     return replace(cell, verdict="degraded", sentence=f"{doubt}; {cell.sentence}")
 
 

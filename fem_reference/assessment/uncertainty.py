@@ -1,4 +1,4 @@
-"""The band of results for unknown parameters of a case, with the sensitivities, as records; and a candidate compared with it."""
+"""Records of the band of results for unknown parameters of a case, its sensitivities, and the candidates compared with it."""
 
 import math
 from dataclasses import dataclass, field
@@ -70,8 +70,8 @@ class Band:
     ``high`` (f,), and the result of the case, ``nominal``; NaN if the quantity is not defined. ``bar`` (f,): the numerical error
     bar of this result, None if it has none. ``distance``: True for a distance from this result; smaller values are always inside.
 
-    ``error``: of the surrogate, as a share of the variance, at runs excluded from its fit; NaN without a surrogate. ``by``: the
-    source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: the reason why there is no band, else empty.
+    ``error``: the error of the surrogate, as a share of the variance, at runs excluded from its fit; NaN without a surrogate.
+    ``by``: the source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: the reason for the lack of a band.
     ``first`` and ``total``: the share of the variance over all frames by key of the parameter; empty if the surrogate is not
     accurate enough (``unreliable``).
     """
@@ -108,7 +108,7 @@ class Band:
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A candidate and a band: its ``values`` (f,), and by frame its ``places``, empty without a band or an expected value."""
+    """A candidate in a band: by frame, its ``values``, its ``places`` (empty where none is expected), its distance ``beyond``."""
 
     candidate: str
     quantity: str
@@ -160,7 +160,7 @@ class Uncertainty:
 
 def place(candidate: str, band: Band, values: Floats) -> Placed:
     """A candidate's ``values`` (f,) compared with a band: inside or outside by more than the error bar of the reference, else
-    undecided; also undecided without a bar. A value that is not finite is no answer.
+    undecided; also undecided without a bar. A value that is not finite has "no answer".
     """
     bar = np.full(len(values), math.nan) if band.bar is None else band.bar
     above, below = band.high - values, math.inf if band.distance else values - band.low

@@ -46,17 +46,17 @@ class Change:
 
     @property
     def frame(self) -> int:
-        """The number of that frame."""
+        """The number of the frame :attr:`at`."""
         return self.numbers[self.at]
 
     @property
     def by(self) -> float:
-        """The change in that frame, positive if the distance grew; NaN without a number before or now."""
+        """The change in the frame :attr:`at`, positive if the distance grew; NaN without a number before or now."""
         return float(self.further[self.at])
 
     @property
     def bar(self) -> float:
-        """The error bar of the reference in that frame."""
+        """The error bar of the reference in the frame :attr:`at`."""
         return float(self.bars[self.at])
 
     @property
@@ -66,7 +66,7 @@ class Change:
 
     @property
     def in_bars(self) -> float:
-        """The change in that frame in error bars, NaN if these are unknown."""
+        """The change in the frame :attr:`at`, in error bars; NaN if these are unknown."""
         return self.by / self.bar if self.bar > 0 else math.nan
 
     @property
@@ -139,7 +139,7 @@ def of_runs(current: CurrentMeasures, before: CurrentMeasures, was: str) -> Vers
     """The versions, compared with another run of the same frames."""
     if current.points.shape != before.points.shape:
         got, want = (one.points.shape[1] for one in (before, current))
-        raise InputError("--against", f"{got} vertices", f"{want}, those of the candidate")
+        raise InputError("--against", f"{got} vertices", f"{want}, as in the candidate")
     names = {name: one.unit for name, one in before.by_name.items() if name in current.by_name}
     known = {name: before.values(name) for name in names}
     with np.errstate(invalid="ignore", over="ignore"):

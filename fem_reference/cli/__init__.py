@@ -16,7 +16,7 @@ from fem_reference.cli._parser import parser
 from fem_reference.foundations.errors import InputError, MissingSoftware
 
 DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
-# The status for a defect of our own: EX_SOFTWARE of sysexits.h. Python's status for an exception is 1, which here is a verdict.
+# The status for an error in this program: EX_SOFTWARE of sysexits.h. Python's status for an exception is 1, here a verdict.
 BROKEN = 70
 INTERRUPTED, TERMINATED = 130, 143  # the statuses that shells report for these signals
 TRACEBACK_SETTING = "FEM_REFERENCE_TRACEBACK"
@@ -26,7 +26,7 @@ _CHECKOUT = Path(__file__).resolve().parents[2]  # the checkout, or the folder i
 def entry() -> None:
     """The installed command."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that running work is cleaned up
-    # Numpy reads it when it is loaded; on a busy machine more threads would wait for each other.
+    # Numpy reads this variable when it is loaded. On a busy machine, more threads would wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     sys.exit(main(sys.argv[1:]))
 
@@ -69,11 +69,11 @@ def _explain(message: str, options: argparse.Namespace) -> None:
 def _why_broken(error: BaseException) -> str:
     """The message for an unexpected exception: its text, its place, and a remedy."""
     if isinstance(error, MemoryError):
-        return "not enough memory; nothing was judged. Smaller input, or larger tetrahedra, need less"
+        return "not enough memory; nothing was judged. Smaller input or larger tetrahedra need less memory"
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("fem_reference"):
         return (
-            f"the Python package {error.name} is not installed for {sys.executable}: pip install fem_reference there, which brings "
-            "all that it needs"
+            f"the Python package {error.name} is not installed for {sys.executable}: use its pip to install fem_reference with "
+            "all packages that it needs"
         )
     frames = traceback.extract_tb(error.__traceback__)
     places = [f"{Path(frame.filename).name}:{frame.lineno}" for frame in frames[-3:]]
@@ -82,7 +82,7 @@ def _why_broken(error: BaseException) -> str:
         traceback.print_exception(error)
     return (
         f"an error in fem-reference itself, not a verdict: {what} ({' < '.join(reversed(places))}). Please report it to whoever "
-        f"gave you fem-reference, with the command line; {TRACEBACK_SETTING}=1 shows all of it"
+        f"gave you fem-reference, with the command line; {TRACEBACK_SETTING}=1 shows the full traceback"
     )
 
 
@@ -102,7 +102,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 def _check_name(name: str | None) -> None:
     """InputError if ``--name`` cannot be the name of a page: the names of other files beside pages are reserved."""
-    from fem_reference.report.asked import LONGEST  # here, as packages that this module needs may be missing
+    from fem_reference.report.asked import LONGEST  # imported here, as packages that it needs may be missing
 
     taken = ("runs", "docs", "index")
     if name is not None and (name in taken or not re.fullmatch(rf"\w[\w.=+-]{{0,{LONGEST - 1}}}", name)):

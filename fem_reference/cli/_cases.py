@@ -27,7 +27,7 @@ from fem_reference.studies.execution import Bench
 def scene_of(options: argparse.Namespace) -> Case:
     """The case with the changes by ``--set``, the effects that it needs, and the expectations of all candidates by ``--limit``."""
     if options.negative_control and options.set:
-        raise InputError("--negative-control", "with --set", "one of the two")
+        raise InputError("--negative-control", "this option with --set", "one of the two")
     changes = dict(map(casefile.setting, options.set))
     read = casefile.read(options.case, with_negative_control=options.negative_control, changes=changes)
     case = of_case.chosen(read)
@@ -59,7 +59,7 @@ def _expectation(text: str, units: Mapping[str, str]) -> Expectation:
     except ValueError as error:
         raise InputError("--limit", f'"{name}={within}"', f"a value in {units[name]}: {error}") from error
     table = {"of": "candidates", "metric": metric, "statistic": statistic, "truth": f"0 {unit}" if unit else 0.0}
-    table |= {"within": limit, "kind": "property", "because": "asked for by --limit"}
+    table |= {"within": limit, "kind": "property", "because": "requested by --limit"}
     return parse(Expectation, table, "--limit")
 
 
@@ -75,7 +75,7 @@ def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
     names = [candidate.name for candidate in case.candidate]
     if text in names:
         if Path(text).is_dir():
-            got = f'"{text}", a candidate of the case and a folder'
+            got = f'"{text}", which is both a candidate of the case and a folder'
             raise InputError("--candidate", got, f"another name, or ./{text}")
         return own_candidates(case)[names.index(text)]
     if text in solvers.names(case.task) and not Path(text).exists():
@@ -106,7 +106,7 @@ def check_names(names: list[str]) -> None:
         if name == "reference":
             raise InputError("--candidate", '"reference"', "another name: candidates are measured against this run")
         if names.count(name) > 1:
-            raise InputError("--candidate", f'"{name}" twice', "folders and candidates of different names")
+            raise InputError("--candidate", f'"{name}" twice', "folders and candidates with different names")
 
 
 def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[C]:
@@ -151,7 +151,7 @@ def candidates(case: Case, chosen: Iterable[Candidate]) -> tuple[Part, ...]:
 
 def publish(options: argparse.Namespace, asked: Asked, page: Page, facts: dict[str, Any], text: str) -> None:
     """Print ``text`` (with ``--json`` also write ``facts``), and write a page into ``--out``, under ``--name`` if given."""
-    write_output(facts, text, options)  # before the page, which may fail
+    write_output(facts, text, options)  # printed first, as writing the page may fail
     print(*written(asked, page, out(options), options.page_name)[1], sep="\n")
 
 
@@ -163,7 +163,7 @@ def judged(bench: Bench[Case], options: argparse.Namespace, chosen: list[tuple[C
 
 
 def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
-    """Measure and judge the ``chosen`` candidates, and write the page; bad input shows before anything is solved."""
+    """Measure and judge the ``chosen`` candidates, and write the page; bad input is reported before anything is solved."""
     bench = checked_bench(case, options, chosen)
     if case.parts:
         return _compared_muscles(bench, options, chosen)
@@ -211,7 +211,7 @@ def unturned(options: argparse.Namespace, word: str) -> list[str]:
     if not options.negative_control or word == "fail":
         return []
     why = "its change is not judged here (compare judges candidates too), or is too small"
-    return [f"negative control: the verdict is {word} and should be fail: {why}"]
+    return [f"negative control: the verdict is {word} but should be fail: {why}"]
 
 
 def status(results: Iterable[Comparison]) -> int:

@@ -37,7 +37,7 @@ _SHARED: dict[str, dict[str, Any]] = {
         "metavar": "KEY=VALUE",
         "help": "change a key of the case, such as muscle.tet_size='8 mm'; may be repeated",
     },
-    "--unit": {"help": "unit of length of the frames in DIR (default: that of its candidate.toml, else mm)"},
+    "--unit": {"help": "unit of length of the frames in DIR (default: the unit in its candidate.toml, else mm)"},
     "--solver-command": {
         "metavar": "COMMAND",
         "help": "your own solver as a candidate: a command with {scene} and {out}, and settings in braces that a "
@@ -45,7 +45,7 @@ _SHARED: dict[str, dict[str, Any]] = {
     },
     "--error-bar": {
         "action": "store_true",
-        "help": "compute error bars of the reference: solve it on larger tetrahedra too, with stiffer contact if bones press",
+        "help": "compute error bars of the reference: also solve it on larger tetrahedra, and with stiffer contact if bones press",
     },
     "--negative-control": {
         "action": "store_true",
@@ -61,10 +61,10 @@ _SHARED: dict[str, dict[str, Any]] = {
         "metavar": "N",
         "help": "MPI processes of the reference (default: 1, or 2 for large bodies if cores are free)",
     },
-    "--workers": {"type": int, "default": 1, "metavar": "N", "help": "number of runs made at once (default: 1)"},
+    "--workers": {"type": int, "default": 1, "metavar": "N", "help": "number of simultaneous runs (default: 1)"},
     "--scheduler": {
         "metavar": "ADDRESS",
-        "help": "address of a Dask scheduler (such as dask-jobqueue starts) whose workers make the runs; they need access to --out",
+        "help": "address of a Dask scheduler (for example of dask-jobqueue) whose workers make the runs; they need access to --out",
     },
 }
 
@@ -92,7 +92,7 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
     kinds = whole.add_subparsers(metavar="VERB", required=True)
     for name in names():
-        # The purpose of a verb is read from its file, as importing it takes long.
+        # The purpose of a verb is read from its file, as importing the file takes long.
         body = ast.parse((_FOLDER / f"{name.replace('-', '_')}.py").read_bytes()).body
         assigned = {ast.unparse(one.targets[0]): one.value for one in body if isinstance(one, ast.Assign)}
         text = ast.literal_eval(assigned["HELP"])
@@ -108,7 +108,7 @@ def _add(verb: ModuleType, sub: argparse.ArgumentParser) -> None:
     sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, negative_control=False)
     sub.set_defaults(limit=[], writes=True, page_name=None)
     verb.add_options(sub)
-    sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
+    sub.add_argument("--out", type=Path, metavar="DIR", help="folder for pages and stored runs (default: reports)")
     sub.add_argument("--json", type=Path, metavar="FILE", help="write the printed results as JSON")
     sub.add_argument("--quiet", action="store_true", help="show no progress")
 

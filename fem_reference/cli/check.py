@@ -1,4 +1,4 @@
-"""The verb ``check``: a candidate against its own earlier results and against the reference, for the author's pipeline.
+"""The verb ``check``: a candidate against its own earlier results and against the reference, for continuous integration.
 
 An inconclusive result has exit status 0: an uncertain reference is not the fault of the checked change. The text and the Markdown
 file call such a result inconclusive, the JUnit file skipped.
@@ -17,7 +17,7 @@ from fem_reference.report import regression_texts
 from fem_reference.scenes import casefile
 from fem_reference.studies import refinement
 
-HELP = "judge a candidate against its earlier results and against the reference, for a pipeline"
+HELP = "judge a candidate against its earlier results and against the reference, for continuous integration"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     either = "a candidate of the case or a folder of frames"
     parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=either)
     share(parser, "--unit")
-    past = "JSON file of its earlier measures"
+    past = "JSON file of the candidate's earlier measures"
     parser.add_argument("--baseline", type=Path, required=True, metavar="FILE", help=past)
     anew = "rewrite the baseline from the current measures; its tolerances and limits stay"
     parser.add_argument("--update", action="store_true", help=anew)
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     bench = checked_bench(scene, options, [(entry, place)])
     # Errors of the baseline are reported before anything is solved.
     (baseline.check if options.update else baseline.read)(options.baseline, scene, entry.name)
-    candidate = bench.obtain(entry.name, entry, place)  # before the reference, as it may be bad input
+    candidate = bench.obtain(entry.name, entry, place)  # before the reference, as the candidate may be bad input
     reference = bench.reference()
     failed = [one for one in (reference, candidate) if one.outcome.status != "converged"]
     if failed:

@@ -28,7 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     ours = "a shipped solver as a candidate, with its standard settings if the case has none; may be repeated"
     parser.add_argument("--solver", action="append", default=[], metavar="NAME", help=ours)
     share(parser, "--solver-command")
-    past = "write the page of changes since earlier results: a baseline of check, a stored run, a folder of frames"
+    past = "write the page of changes since earlier results (a baseline of check, a stored run or a folder of frames)"
     parser.add_argument("--against", type=Path, metavar="BASELINE", help=past)
     share(parser, "--unit")
     limit = "judge candidates: greatest deviation of a statistic, such as surface_deviation.max='5 mm'; may be repeated"

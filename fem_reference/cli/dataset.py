@@ -1,4 +1,4 @@
-"""The verb ``dataset``: a data set of solved and checked muscles to learn from."""
+"""The verb ``dataset``: a data set of solved and checked muscles for machine learning."""
 
 import argparse
 from pathlib import Path
@@ -8,17 +8,15 @@ from fem_reference.cli._parser import positive, share
 from fem_reference.studies import dataset
 from fem_reference.studies.campaign import Workers
 
-HELP = (
-    "build a data set to learn from: muscles drawn at random and shipped cases, solved, checked, with hashes and splits"
-)
+HELP = "build a data set for machine learning: random muscles and shipped cases, solved and checked, with hashes and splits"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb: the folder and the sizes."""
-    parser.add_argument("folder", metavar="FOLDER", type=Path, help="a new folder, or one that a stopped build left")
-    parser.add_argument("--muscles", type=positive, default=24, metavar="N", help="muscles drawn (default: 24)")
+    parser.add_argument("folder", metavar="FOLDER", type=Path, help="a new folder, or one of an interrupted build")
+    parser.add_argument("--muscles", type=positive, default=24, metavar="N", help="random muscles (default: 24)")
     parser.add_argument(
-        "--poses", type=positive, default=12, metavar="N", help="poses of each besides rest (default: 12)"
+        "--poses", type=positive, default=12, metavar="N", help="poses of each muscle besides rest (default: 12)"
     )
     parser.add_argument("--seed", type=positive, default=1, metavar="N", help="seed of the random numbers (default: 1)")
     share(parser, "--workers", "--scheduler")
@@ -32,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     left = found["left_out"]
     assert isinstance(left, dict)
     facts = {key: found[key] for key in ("scenes", "frames", "left_out", "left_out_share")}
-    lines = [f"{options.folder}: {found['scenes']} scenes, {found['frames']} frames; load.py in it reads them"]
+    lines = [f"{options.folder}: {found['scenes']} scenes, {found['frames']} frames; load.py in this folder reads them"]
     lines += [f"left out: {name}: {why}" for name, why in left.items()]
     write_output({"folder": str(options.folder), **facts}, "\n".join(lines), options)
     return DONE

@@ -19,7 +19,7 @@ from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import by_muscle, judging, refinement
 from fem_reference.studies.execution import Bench
 
-HELP = "write all that another solver needs, in open formats; or runs for ParaView"
+HELP = "write all data that another solver needs, in open formats; or runs for ParaView"
 PARAVIEW = "paraview"
 
 
@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
         return _runs_of_several(scene, options) if scene.parts else _runs(casefile.muscle(scene), options)
     if options.candidate or options.unit or options.solve:
         got = f"--candidate, --unit or --solve for {options.format}"
-        raise InputError("export", got, f"them for {PARAVIEW} only")
+        raise InputError("export", got, f"these options for {PARAVIEW} only")
     bench = Bench(scene if scene.parts else casefile.muscle(scene), out(options) / "runs")
     written = export.export(bench.scene, bench.problem, options.to, options.format)
     facts = {"case": scene.name, "folder": str(options.to), "files": written}
@@ -90,6 +90,6 @@ def _with_states(bench: Bench[MuscleCase], *, again: bool) -> Run:
     known = bench.known("reference", choice.model_copy(update={"store_state": None}), "reference")
     if known and known.folder and not again and not states.are_kept(known.folder, known.numbers):
         took = duration(known.outcome.cost.get("seconds"))
-        got = f"a reference that was solved before without its states ({known.folder}), from which stress and pressure follow"
-        raise InputError("export", got, f"--solve, which solves it again (that took {took})")
+        got = f"a reference that was solved without storing the states that stress and pressure need ({known.folder})"
+        raise InputError("export", got, f"--solve, which solves it again (the last time in {took})")
     return bench.obtain("reference", choice.model_copy(update={"store_state": True}), "reference")

@@ -30,9 +30,9 @@ def run(options: argparse.Namespace) -> int:
     )
     cases, count = fetching.cases_with(found), len(wanted.published) + len(wanted.made)
     lines = [f"{options.to}: {len(found)} of {count} files found, by their content"]
-    lines += [f"missing, of those that are published as they are: {', '.join(kept)}"] if kept else []
-    lines += [f"missing, cleaned, converted or computed, which copying cannot provide: {parts}"] if made else []
-    lines += [f"cases that can be solved with it: {', '.join(cases) or 'none'}", f"licence: {wanted.licence}"]
+    lines += [f"missing files that are published in this form: {', '.join(kept)}"] if kept else []
+    lines += [f"missing files that were cleaned, converted or computed, not published: {parts}"] if made else []
+    lines += [f"cases that can be solved with them: {', '.join(cases) or 'none'}", f"licence: {wanted.licence}"]
     lines.append(f"export {DATA_SETTING}={shlex.quote(str(options.to.resolve()))}")
     facts = {"folder": str(options.to), "found": found, "missing": kept + made, "cases": cases}
     write_output(facts, "\n".join(lines), options)

@@ -10,7 +10,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.units import LENGTH_UNITS
 from fem_reference.studies import new_scene
 
-HELP = "write a scene to start from: a copy of a case, or one of your own muscle and bones"
+HELP = "write a scene to start from: a copy of a case, or a scene of your own muscle and bones"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -31,16 +31,16 @@ def run(options: argparse.Namespace) -> int:
     if options.muscle is None and options.bone:
         raise InputError("--bone", "a bone without --muscle", "the muscle too")
     if options.muscle is None and options.unit is not None:
-        raise InputError("--unit", f'"{options.unit}" without --muscle', "files whose unit it is")
+        raise InputError("--unit", f'"{options.unit}" without --muscle', "files with this unit")
     if options.muscle is not None and options.case is not None:
-        raise InputError("--from", f'"{options.case}" beside --muscle', "one of the two")
+        raise InputError("--from", f'"{options.case}" with --muscle', "one of the two")
     folder, unit, said = options.name, {}, ""
     if options.muscle is None:
         new_scene.copied(options.case or "hip_flexion", folder)
     else:
         found = new_scene.of_surfaces(folder, options.muscle, options.bone, options.unit)
         unit = {"unit": found.name} | ({"unit_guessed": found.why} if found.why else {})
-        said = f"lengths are in {found.name}, guessed: {found.why}; --unit states it\n" if found.why else ""
+        said = f"lengths are in {found.name} (guessed: {found.why}); --unit sets the unit\n" if found.why else ""
     place = shlex.quote(str(folder if len(folder.parts) > 1 else f"./{folder}"))
     call = os.environ.get("FEM_REFERENCE_COMMAND", "fem-reference")  # the name by which the command was called
     text = f"{said}{folder / 'case.toml'}: edit it, then\n  {call} validate {place}\n  {call} run {place}"

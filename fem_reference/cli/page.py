@@ -1,4 +1,4 @@
-"""The verb ``page``: a page over several cases."""
+"""The verb ``page``: a page on several cases."""
 
 import argparse
 from collections.abc import Callable, Iterable
@@ -23,7 +23,7 @@ from fem_reference.studies.execution import Bench
 from fem_reference.verification import runner
 from fem_reference.verification.lab import lab
 
-HELP = "write a page over several cases"
+HELP = "write a page on several cases"
 TABLE = "table-5-1"
 CLAIMS = "error-bars"
 EXAMPLES = "octave-examples"
@@ -37,7 +37,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
     some = f"for {TABLE}, {CLAIMS} and {ESTIMATION}: only this case (default: all); may be repeated"
     parser.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
-    foreign = f"for {TABLE}: frames that your solver made of a case; may be repeated"
+    foreign = f"for {TABLE}: frames that your solver computed for a case; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
     solving = f"for {ESTIMATION}: also solve the reference with each decomposition into fibres"
     parser.add_argument("--solve", action="store_true", help=solving)
@@ -47,12 +47,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write a page over several cases."""
+    """Write a page on several cases."""
     takes, write = _PAGES[options.name]
     for option in ("case", "candidate", "unit", "solver_command", "set", "quick", "error_bar", "solve"):
         if getattr(options, option) and option not in takes:
             others = listed([name for name, (taken, _) in _PAGES.items() if option in taken])
-            raise InputError("page", f"--{option.replace('_', '-')} for {options.name}", f"it for {others} only")
+            got = f"--{option.replace('_', '-')} for {options.name}"
+            raise InputError("page", got, f"this option for {others} only")
     return write(options)
 
 
@@ -74,7 +75,7 @@ def _table(options: argparse.Namespace) -> int:
     scenes = {scene.name: scene for scene in _scenes(options, table_5_1.SCENARIOS)}
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:
-        Bench(scenes[name], out(options)).setup()  # an error if a case that the user named lacks its data
+        Bench(scenes[name], out(options)).setup()  # raises an error if a case that the user named lacks its data
     own = _cases.own_solver(options)
     for name in scenes if own else ():
         foreign.setdefault(name, []).extend(own)
@@ -151,7 +152,7 @@ def _asked(scenes: Iterable[MuscleCase], options: argparse.Namespace, more: Iter
 
 
 def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:
-    """Frames of other people's solvers, by the name of the case."""
+    """Frames of external solvers, by the name of the case."""
     found = dict[str, list[Candidate]]()
     for text in options.candidate:
         case, equals, folder = text.partition("=")

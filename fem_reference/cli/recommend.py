@@ -28,14 +28,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     share(parser, "case", "--set")
     error = "the greatest error that you accept, in the unit of the metric, such as '2 mm' or '1 %%'"
     parser.add_argument("--error", metavar="VALUE", help=error)
-    time = "the longest time for a frame that you accept, such as '5 ms' or '60 fps'"
+    time = "the longest time per frame that you accept, such as '5 ms' or '60 fps'"
     parser.add_argument("--time", metavar="VALUE", help=time)
     metric = f"the statistic whose error counts (default: {MAIN})"
     parser.add_argument("--metric", default=MAIN, metavar="METRIC.STATISTIC", help=metric)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Recommend a setting, or without a request those on the page of a study; exit status 1 if no setting meets a request."""
+    """Recommend a setting or, without a request, the settings on a study's page; exit status 1 if no setting meets a request."""
     scene, metric = casefile.muscle(scene_of(options)), options.metric
     studies = cost.stored(out(options))
     units = {name: unit for study in reversed(studies) for name, unit in study.units.items()}

@@ -1,4 +1,4 @@
-"""The verb ``standings``: our solvers, other people's programs and submitted frames over cases, on one page."""
+"""The verb ``standings``: shipped solvers, external programs and submitted frames on several cases, on one page."""
 
 import argparse
 from pathlib import Path
@@ -14,7 +14,7 @@ from fem_reference.report.asked import Asked
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import standings
 
-HELP = "write the page of standings: our solvers and other people's, over cases; unchanged rows are not measured again"
+HELP = "write the page of standings of shipped and external solvers on several cases; measure only new and changed rows"
 PAGE = "standings"
 
 
@@ -31,9 +31,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--program", action="append", default=[], type=Path, metavar="DIR", help=program)
     submitted = "a folder of frames whose candidate.toml has case, name, version and sha256; no code of it is run; may be repeated"
     parser.add_argument("--submission", action="append", default=[], type=Path, metavar="DIR", help=submitted)
-    only = f"measure again only the rows in these states ({','.join(STATES)}) and new ones, and keep the others"
+    only = f"measure again only the rows in these states ({','.join(STATES)}) and new rows, and keep all others"
     parser.add_argument("--only", default="", metavar="STATES", help=only)
-    limit = "limit of processor time of a solver, not the reference, on a case; beyond it there is no rank (default: %(default)s)"
+    limit = "limit of a solver's processor time on a case, not the reference's; slower solvers have no rank (default: %(default)s)"
     parser.add_argument("--time-limit", default=f"{standings.TIME_LIMIT:g} s", metavar="TIME", help=limit)
     parser.add_argument("--quick", action="store_true", help="cases at their sizes for quick solutions")
     share(parser, "--set", "--name")
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
     entrants += [standings.submission(folder) for folder in options.submission]
     if (options.quick or options.set) and any(one.case and not one.scene for one in entrants):
         want = "the cases as they are published, or the scene that the export states in its candidate.toml"
-        raise InputError("--submission", "--quick or --set beside it", want)
+        raise InputError("--submission", "this option with --quick or --set", want)
     before = load(out(options) / f"{options.page_name or PAGE}.json")
     with fenicsx.shared():
         found = standings.stand(cases, out(options) / "runs", entrants, before, only, limit)

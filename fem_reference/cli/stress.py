@@ -25,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--solver", default=[], choices=[*records.choices(), COMMAND], metavar="NAME", help=only)
     program = "a program in a folder, as in standings; without --solver only such programs run; may be repeated"
     parser.add_argument("--program", action="append", default=[], type=Path, metavar="DIR", help=program)
-    many = "take the reference to the farthest frame of each case without friction in 1, 10 and 40 load steps, which must agree"
+    many = "solve the farthest frame of each case without friction in 1, 10 and 40 load steps of the reference, which must agree"
     parser.add_argument("--steps", action="store_true", help=many)
     meshes = "run the reference on N randomly perturbed meshes of each case as well"
     parser.add_argument("--jitters", type=int, default=0, metavar="N", help=meshes)
@@ -38,8 +38,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("--jitters", options.jitters, "0 or more")
     for name, wanted in (("--steps", options.steps), ("--jitters", options.jitters)):
         if wanted and options.solver and records.REFERENCE not in options.solver:
-            want = f"--solver {records.REFERENCE} too, the only solver that it changes"
-            raise InputError(name, f"it with {', '.join(options.solver)} alone", want)
+            want = f"--solver {records.REFERENCE} too, the only solver that this option affects"
+            raise InputError(name, f"this option with {', '.join(options.solver)} alone", want)
     hard = records.read_all(tuple(options.names))
     commanded, programs = own_solver(options, list(records.choices())), [*map(standings.program, options.program)]
     own = dict[Candidate, Collection[str] | None](dict.fromkeys(commanded))

@@ -38,10 +38,11 @@ __path__ += outside.folders()
 class Effect(Record):
     """A frozen record of the parameters of an effect on a body.
 
-    ``unknowns``: names of the fields that the effect adds. ``needs``: its requirements, of ``"fibre"`` (fibre directions at rest),
+    ``unknowns``: names of the fields that it adds. ``needs``: its requirements, among ``"fibre"`` (fibre directions at rest),
     ``"interval"`` (the time between frame numbers) and ``"momentum"`` (velocities and predicted displacements in a load step).
     ``outer``: True if the effect acts from outside the body, so that its forces do not balance. ``example``: some of its parameters
-    as in scene files, except those of its kind. ``published``: the ranges of its parameters in the literature on muscle, by name.
+    as in scene files, without those of its base class. ``published``: the ranges of its parameters in the literature on muscle, by
+    name.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ()
@@ -96,7 +97,7 @@ class Ramped(Effect):
     @field_validator("ramp")
     @classmethod
     def _check_ramp(cls, ramp: tuple[RampPoint, ...]) -> tuple[RampPoint, ...]:
-        increasing([knot.frame for knot in ramp], "knots whose frames are each later than the one before")
+        increasing([knot.frame for knot in ramp], "knots in the order of their frames, each frame once")
         return ramp
 
     def amount(self, frame: float) -> float:
@@ -116,7 +117,7 @@ class Energy(Effect):
     @classmethod
     def _check_region(cls, region: str) -> str:
         if "momentum" in cls.needs:
-            raise ValueError("no region: the whole body moves")
+            raise ValueError("no region, as the whole body has inertia")
         return region
 
     def energy(self, state: State) -> Any:
@@ -184,7 +185,7 @@ class Load(Effect):
     on: str
 
     def along(self, normals: Floats) -> Bools:
-        """True (f, 3) for the axes along which the load may act on facets with ``normals`` (f, 3), of which the sizes count."""
+        """True (f, 3) for the axes along which the load may act on facets, from the magnitudes of their ``normals`` (f, 3)."""
         return np.ones(normals.shape, bool)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
@@ -264,7 +265,7 @@ def name_of(effect: Record | type[Record]) -> str:
 
 
 def example(name: str) -> dict[str, Any]:
-    """An example of the parameters of the effect ``name``, including the parameters of its kind."""
+    """An example of the parameters of the effect ``name``, including the parameters of its base classes."""
     stated = [vars(kind).get("example", {}) for kind in reversed(find(name).__mro__)]
     return {key: value for one in stated for key, value in one.items()}
 
@@ -281,7 +282,7 @@ def _record(name: str) -> type[Record]:
 
 
 def make(name: str, **parameters: Any) -> "Effect":
-    """The effect ``name``, its parameters as in scene files or numbers in mm, N, MPa, s, tonne; InputError if one is wrong.
+    """The effect ``name``, with parameters as in scene files, or as numbers in mm, N, MPa, s, tonne; InputError if one is wrong.
 
     >>> make("neo_hooke", mu="10 kPa").mu, make("neo_hooke", mu=0.01).mu
     (0.01, 0.01)

@@ -8,7 +8,7 @@ from pydantic import Field
 from fem_reference.effects import Energy, Moduli, State
 from fem_reference.foundations.units import PositivePressure
 
-# The cosines of twice the angle, evenly over half a turn; Python floats, as numpy's would turn symbols into arrays.
+# The cosines of twice the angle, evenly over half a turn; Python floats, as numpy floats would turn symbols into arrays.
 _DIRECTIONS = 8
 COSINES = [float(np.cos((j + 0.5) * np.pi / _DIRECTIONS)) for j in range(_DIRECTIONS)]
 # The square root has no derivative at 0, so this share of the squared mean is added to the squared spread.
@@ -22,7 +22,7 @@ class CollagenAcross(Energy):
     ``k1`` [MPa], ``k2`` without unit. In the plane across the fibre, I is ``mean + spread cos(2 angle)``. There the mean is half
     the trace of C, and ``mean^2 - spread^2`` its determinant. Eight angles are summed.
 
-    Source: integration over the directions of collagen, as by Bleiler, Ponte Castaneda and Roehrle 2019, doi
+    Source: integration over the directions of collagen, as in Bleiler, Ponte Castaneda and Roehrle 2019, doi
     10.1016/j.jmbbm.2019.05.012, for muscle, which is then stiffer in tension across its fibres than along them; here only
     directions in the plane are used. The exponential is taken from Holzapfel, Gasser and Ogden 2000, doi 10.1023/A:1010835316564.
     """

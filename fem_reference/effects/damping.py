@@ -1,4 +1,4 @@
-"""Drag of the ground on moving tissue: prevents a free body from drifting, and slows the departure from an unstable state."""
+"""Drag of the ground on moving tissue, which keeps a free body from drifting and slows the departure from an unstable state."""
 
 from typing import Any, ClassVar
 
@@ -27,7 +27,7 @@ class Damping(Energy):
     def indicator(self, scene: Estimates) -> Indicator:
         """The sag of a beam under the drag, and the shift of a bar along it."""
         force, sideways = (self.coefficient * scene.in_time(speed) for speed in (scene.speed, scene.sideways))
-        rule, stress = "drag over the length against the shear modulus", force * scene.length
+        rule, stress = "drag per cross-section over the shear modulus", force * scene.length
         lag = scene.lag(scene.bend(sideways) + scene.draw(force))
         return Indicator(rule, stress / scene.shear, lag, stress)
 

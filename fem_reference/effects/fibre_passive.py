@@ -18,11 +18,11 @@ _SOURCE = (
 
 
 class FibrePassive(PassiveFibres):
-    """``dW/dl = stress f(l)``, with ``l`` the isochoric fibre stretch divided by the optimal one: ``f = 0`` up to 1,
+    """``dW/dl = stress f(l)``, with ``l`` the isochoric fibre stretch divided by the optimal stretch: ``f = 0`` up to 1,
     ``p1 (exp(p2 (l - 1)) - 1)`` up to ``linear_from``, and beyond it the tangent line.
 
-    ``stress`` [MPa]: the peak active stress, by which Blemker normalises; ``p1``, ``p2``: without unit; ``optimal_stretch``: the
-    fibre stretch at optimal length; ``linear_from``: a value of ``l``. Source: Blemker, Pinsky and Delp 2005,
+    ``stress`` [MPa]: the peak active stress, which scales the law in the source; ``p1``, ``p2``: without unit; ``optimal_stretch``:
+    the fibre stretch at optimal length; ``linear_from``: a value of ``l``. Source: Blemker, Pinsky and Delp 2005,
     doi 10.1016/j.jbiomech.2004.04.009.
 
     Valid for ``l`` up to 1.6, or up to ``linear_from`` if that is greater. At 1.6 the active tension of the same source ends, and

@@ -8,7 +8,7 @@ from pydantic import Field
 from fem_reference.effects import PassiveFibres, State
 from fem_reference.foundations.units import PositivePressure
 
-# On (0, 1), as Python floats, as numpy's would turn symbols into arrays.
+# On (0, 1), as Python floats, because numpy floats would turn symbols into arrays.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 RULE = tuple(zip(((_POINTS + 1) / 2).tolist(), (_WEIGHTS / 2).tolist(), strict=True))
 

@@ -31,7 +31,7 @@ class Inertia(Energy):
     spectral_radius: float = Field(default=0.9, ge=0, le=1)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The lag of a beam by the force of its acceleration, and the stress of the wave that a jump of velocity sends through the
+        """The lag of a beam under its inertial force, and the stress of the wave that a jump of velocity sends through the
         beam. The first frequency of the beam follows from its deflection under its own weight.
         """
         square = scene.bend(self.density)  # the inverse square of the frequency

@@ -12,7 +12,7 @@ from fem_reference.foundations.units import PositiveLength, PositivePressure
 class Membrane(Load):
     """``h mu/2 (I + 1/a^2 - 3)`` per rest area, with ``I = tr C - N . C N`` the sum of the squared stretches in the surface, a the
     ratio of present area to area at rest, and N the normal at rest: an incompressible neo-Hookean sheet in plane stress, whose
-    thickness follows from its area (Holzapfel 2000, Nonlinear Solid Mechanics, ch. 6.2, of membranes).
+    thickness follows from its area (Holzapfel 2000, Nonlinear Solid Mechanics, ch. 6.2, on membranes).
 
     ``on``: the part of the surface; ``in``, if given: a region, in which the effect acts in proportion to the share, linear between
     the vertices of cells; ``thickness``: h at rest [mm]; ``mu``: shear modulus at rest [MPa].

@@ -9,7 +9,7 @@ from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.loads import Shape, Wrench
 from fem_reference.foundations.mesh import Bools, Floats
 
-_ROUNDED = 1e-6  # components of unit normals, of which files with 32 bits know no more
+_ROUNDED = 1e-6  # rounding of the components of unit normals in files with 32 bits
 
 
 class Pressure(Ramped, Load):
@@ -18,8 +18,8 @@ class Pressure(Ramped, Load):
     ``on``: the part of the surface; ``pressure``: p [MPa], inwards if positive.
 
     On the entire surface of a body that can shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is exactly 1 - p / K. A
-    clamped part keeps its size, and the body around it is sheared: in a cube of side L with one clamped triangle of legs a, V/V0 is
-    greater by 0.15 mu / K (a / L)^3 p / K. For example, it is 0.9002 instead of 0.9 if a is L/2 and K is 10 mu.
+    clamped part keeps its size, and the body around it is sheared: in a cube of side L with one clamped triangle with legs a, V/V0
+    is greater by 0.15 mu / K (a / L)^3 p / K. For example, it is 0.9002 instead of 0.9 if a is L/2 and K is 10 mu.
     """
 
     example: ClassVar[dict[str, Any]] = {"pressure": "8 kPa"}
@@ -37,7 +37,7 @@ class Pressure(Ramped, Load):
         return None if found is None else Wrench(*(-self.pressure * one for one in found))
 
     def along(self, normals: Floats) -> Bools:
-        """True for the components of the normals, but for rounding."""
+        """True for the components of the normals that are not zero, up to rounding."""
         return normals > _ROUNDED
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:

@@ -29,7 +29,7 @@ class Prestretch(Ramped, Prestrain):
     def indicator(self, scene: Estimates) -> Indicator:
         """The shortening of fibres as they are released, and the resulting stress of the matrix."""
         part = scene.greatest(self) * abs(self.stretch - 1)
-        return Indicator("stretch of the fibres less 1", part, 0.1 * part * scene.length, 3 * scene.shear * part)
+        return Indicator("stretch of the fibres minus 1", part, 0.1 * part * scene.length, 3 * scene.shear * part)
 
     def elastic(self, state: State) -> Sequence[Sequence[Any]]:
         return state.stretched(1 + state.amount * (self.stretch - 1))

@@ -7,7 +7,7 @@ from fem_reference.foundations.formula import Formula, evaluate
 
 
 class Source(FieldEffect):
-    """``-f``. Report eq. 4.4: ``D f``.
+    """``-f``, a source of strength f. Report eq. 4.4: ``D f``.
 
     ``strength``: f, a number or a formula of the coordinates [psi / time]; ``where``: everywhere, or only where y is above the mean
     y of the mesh's vertices, as in listing 4.5, line 17. An element that this line cuts has f in proportion to its share above.

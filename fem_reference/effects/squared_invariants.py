@@ -7,11 +7,11 @@ from fem_reference.foundations.units import PositivePressure
 
 
 class SquaredInvariants(Energy):
-    """``mu/2 (I1 - 3)^2 + lame/2 (J - 1)^2``.
+    """``mu/2 (I1 - 3)^2 + lame/2 (J - 1)^2``: the two squared constraints of a tetrahedron in XPBD.
 
     ``mu``, ``lame``: stiffness of the two terms [MPa]. They are not Lame's parameters: at rest the shear modulus is 0, and the bulk
     modulus is ``lame + 4 mu``. Source: Newton 1.8.0, newton/_src/solvers/xpbd/kernels.py, ``solve_tetrahedra``, whose compliances
-    are 1 over stiffness times rest volume.
+    are 1 / (stiffness times rest volume).
     """
 
     example: ClassVar[dict[str, Any]] = {"mu": "10 kPa", "lame": "90 kPa"}

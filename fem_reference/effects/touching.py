@@ -11,10 +11,10 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 class MuscleContact(Interaction):
     """The pressure law of ``contact``, applied equally to both sides of the gap between two muscles, or between places of a single
-    muscle, with any sliding (``fem_reference.problems.touching.Touching``).
+    muscle, with any amount of sliding (``fem_reference.problems.touching.Touching``).
 
-    ``stiffness`` [MPa/mm]: under the pressure p the two sides overlap by at most p / stiffness. ``smoothing`` [mm]:
-    the distance at which contact begins, and the greatest overlap with another muscle, or with itself, that is allowed at rest.
+    ``stiffness`` [MPa/mm]: under the pressure p the two sides overlap by at most p / stiffness. ``smoothing`` [mm]: the distance at
+    which contact begins, and the greatest overlap of two muscles, or of a muscle with itself, that is allowed at rest.
     ``friction``: the coefficient of Coulomb's law, greater than 0; without it contact is frictionless. Each of several muscles
     touches the others but not itself.
     """

@@ -14,7 +14,7 @@ from fem_reference.foundations.units import PressureVector
 
 
 class Traction(Ramped, Load):
-    """``amount t``.
+    """``amount t``: a force per area at rest, whose direction and size do not depend on the deformation.
 
     ``on``: the part of the surface; ``force``: t, the force per area at rest (3,) [MPa].
     """

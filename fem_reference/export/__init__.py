@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 Format = Literal["open", "febio"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 _FEBIO_FILES = """\
-| `scene.feb` | the same for FEBio (format 4.0); `FEBIO.md` states what is the same and what differs |
+| `scene.feb` | the same scene for FEBio (format 4.0); `FEBIO.md` lists counterparts and differences |
 | `tet10.csv` | the ten nodes of each element of `scene.feb`, in FEBio's order |
 """
 _FEBIO_OF_ALL = """
@@ -32,7 +32,7 @@ _NO_DIFFERENCE = "no springs at points of the surface, no bone that overlaps the
 
 
 def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: Format) -> list[str]:
-    """Write the problem that ``build`` makes of a ``case`` into ``folder``, completely or not at all; the names of its files.
+    """Write the problem that ``build`` makes of a ``case`` into ``folder``, completely or not at all; returns its file names.
 
     ``"febio"`` adds FEBio's file to the open formats, and warns if FEBio's model differs. Each of several muscles has a folder with
     its name, and FEBio has one file for all muscles. InputError if the folder is not free, or FEBio lacks an effect of the case.
@@ -42,7 +42,7 @@ def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: For
     check(folder)
     for one in _parts(case) if form == "febio" else ():
         febio.check(one)
-    with new_folder(folder) as part:  # made first, so that an error shows before a problem is built
+    with new_folder(folder) as part:  # created first, so that an error is raised before a problem is built
         problem = build()
         if isinstance(problem, MusclesProblem):
             _write_several(case, problem, part, form)
@@ -72,7 +72,7 @@ def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, more: str) ->
 
 
 def _write_several(case: Case, problem: MusclesProblem, folder: Path, form: Format) -> None:
-    """Write a folder for each muscle, and a text for all of them."""
+    """Write a folder for each muscle, and a text on all muscles."""
     for part, (name, one) in zip(_parts(case), problem.problems.items(), strict=True):
         (folder / name).mkdir()
         _write(part.model_copy(update={"name": case.name}), one, folder / name, "")

@@ -43,34 +43,34 @@ def check(case: MuscleCase) -> None:
     """Raise InputError if FEBio lacks an effect of the case, or has it in another form."""
     for i, effect in enumerate(case.effects):
         if not isinstance(effect, SAME):
-            want = f"what FEBio has in the same form: {', '.join(name_of(kind) for kind in SAME)}"
+            want = f"an effect that FEBio has in the same form: {', '.join(name_of(kind) for kind in SAME)}"
             raise InputError(join(case.place, f"effect[{i}]"), f'"{name_of(effect)}"', want)
     if len({(one.c4, one.linear_from) for one in case.effects if isinstance(one, FibrePassiveFebio)}) > 1:
-        got = "fibre_passive_febio of different c4 or linear_from"
-        want = "the same in all regions, as FEBio has one law"
+        got = "fibre_passive_febio with different c4 or linear_from"
+        want = "the same values in all regions, as FEBio has one law"
         raise InputError(join(case.place, "effect"), got, want)
     matrix = (NeoHooke, MooneyRivlin), "no matrix: neither neo_hooke nor mooney_rivlin"
     volume = (Incompressible, IncompressiblePenalty), "neither incompressible nor incompressible_penalty"
     for kinds, got in (matrix, volume):
         if not any(isinstance(effect, kinds) for effect in case.effects):
-            raise InputError(join(case.place, "effect"), got, "one of them, which FEBio's uncoupled materials need")
+            raise InputError(join(case.place, "effect"), got, "one of them, for an uncoupled material of FEBio")
 
 
 def write(problem: MuscleProblem, folder: Path) -> None:
-    """``scene.feb`` and ``tet10.csv`` into ``folder``."""
+    """Write ``scene.feb`` and ``tet10.csv`` into ``folder``."""
     write_nodes(problem, folder)
     write_model(model(problem), folder)
 
 
 def write_nodes(problem: MuscleProblem, folder: Path) -> None:
-    """``tet10.csv``, for readers of FEBio's nodes, into ``folder``."""
+    """Write ``tet10.csv``, for readers of FEBio's nodes, into ``folder``."""
     _, tets = febio_mesh.quadratic(problem.mesh)
     rows = "".join(",".join(map(str, row)) + "\n" for row in tets.tolist())
     files.write_text(folder / "tet10.csv", ",".join(f"n{i}" for i in range(10)) + "\n" + rows)
 
 
 def write_model(root: Element, folder: Path) -> None:
-    """``scene.feb`` into ``folder``."""
+    """Write ``scene.feb`` into ``folder``."""
     ElementTree.indent(root, " ")
     text = ElementTree.tostring(root, encoding="unicode")
     files.write_text(folder / "scene.feb", f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
@@ -105,14 +105,14 @@ def model(problem: MuscleProblem) -> Element:
 
 
 def _control(root: Element, problem: MuscleProblem) -> None:
-    """Add the control of steps: from frame to frame, at most ``LONGEST_STEP`` long, shorter where FEBio needs it."""
+    """Add the control of steps from frame to frame, which are at most ``LONGEST_STEP`` long, and shorter where FEBio needs it."""
     control, step = SubElement(root, "Control"), _step(problem)
     steps = round((problem.frames[-1] - problem.frames[0]) / step)
     settings = {"analysis": "STATIC", "time_steps": steps, "step_size": step}
     settings |= {"plot_level": "PLOT_MUST_POINTS", "output_level": "OUTPUT_MUST_POINTS"}
     febio_mesh.leaves(control, settings)
     stepper = SubElement(control, "time_stepper", type="default")
-    retries = {"max_retries": 20, "aggressiveness": 1, "cutback": 0.5}  # half the step at each
+    retries = {"max_retries": 20, "aggressiveness": 1, "cutback": 0.5}  # each retry has half the step
     febio_mesh.leaves(stepper, retries | {"opt_iter": 15, "dtmin": step / 200})
     febio_mesh.leaf(stepper, "dtmax", step, lc="1")
     solver = SubElement(control, "solver", type="solid")

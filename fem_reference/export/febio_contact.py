@@ -2,7 +2,7 @@
 
 FEBio's ``tied-elastic`` pulls with a traction: its penalty times the vector from a point of the first surface to the point of the
 second surface that was nearest at rest, minus this vector at rest. The traction is integrated over the present first surface, a
-rigid copy of the attached area, which keeps its rest area. So it acts as the springs of an attachment: a stiffness per rest area,
+rigid copy of the attached area, which keeps its rest area. So it acts like the springs of an attachment: a stiffness per rest area,
 equal in all directions. Springs at points of the muscle's surface are small rigid triangles at the nearest points of the tets.
 """
 
@@ -27,12 +27,12 @@ _AT_ONCE = 10.0
 SPRING_SEARCH_RADIUS = 1.0  # the search radius of springs [mm], whose two surfaces coincide at rest
 # Contact by penalty alone, in one pass, with the given penalty and the complete tangent.
 PENALTY = {"laugon": 0, "two_pass": 0, "auto_penalty": 0, "symmetric_stiffness": 0}
-# FEBio 4.11 has only run springs over facets: the force on the femur differs by 5.3 % on gluteus_medius and 8.8 % on
+# FEBio 4.11 has run springs over facets only: the force on the femur differs by 5.3 % on gluteus_medius and 8.8 % on
 # gluteus_maximus.
 MEASURED = (
-    "FEBio 4.11 has not run springs at points yet. In the reference, on gluteus_medius at frame 20, those at the nearest points "
-    "differ from its own by 0.4 % of the force on the femur and 0.01 mm (rms), with tetrahedra of 12 mm by 1.2 % and 0.04 mm; over "
-    "facets by 5.8 % and 0.17 mm (FEBio 4.11, over facets: 5.3 and 8.8 % of the force, up to 1.1 mm, on two muscles of the hip)"
+    "FEBio 4.11 has not run springs at points yet. In the reference, springs at the nearest points change the force on the femur "
+    "by 0.4 % and positions by 0.01 mm (rms; gluteus_medius, frame 20), with 12 mm tetrahedra by 1.2 % and 0.04 mm; springs over "
+    "facets change them by 5.8 % and 0.17 mm (FEBio 4.11: 5.3 and 8.8 % of the force, up to 1.1 mm, on two hip muscles)"
 )
 _FELT = 1e-3  # the least overlap at rest that is reported [mm]
 
@@ -43,7 +43,7 @@ def has_contact(problem: MuscleProblem) -> bool:
 
 
 def add_contact(root: Element, problem: MuscleProblem) -> None:
-    """The section ``Contact``, if something acts between surfaces."""
+    """Add the section ``Contact``, if something acts between surfaces."""
     if not has_contact(problem):
         return
     contacts = SubElement(root, "Contact")
@@ -59,7 +59,7 @@ def add_contact(root: Element, problem: MuscleProblem) -> None:
 
 
 def pair(contacts: Element, kind: str, name: str, settings: dict[str, float]) -> None:
-    """A contact of a ``kind`` between the surfaces of the pair of this name."""
+    """Add a contact of a ``kind`` between the surfaces of the pair with this name."""
     entry = SubElement(contacts, "contact", name=f"{name}_contact", type=kind, surface_pair=f"{name}_pair")
     febio_mesh.leaves(entry, {**PENALTY, **settings})
 
@@ -82,8 +82,8 @@ def overlaps(problem: MuscleProblem) -> dict[str, float]:
 
 
 def search_radius(problem: MuscleProblem, deep: float) -> float:
-    """Depth [mm] inside a bone to which FEBio looks for contact, if the muscle is ``deep`` [mm] in the bone at rest. It is less if
-    contact would at once press with more than the matrix withstands.
+    """Depth [mm] inside a bone to which FEBio looks for contact, if the muscle penetrates the bone by ``deep`` [mm] at rest. It is
+    less if contact would immediately press with more than the matrix withstands.
     """
     assert problem.contact is not None  # called only with contact
     softest = min(sum(matrix_constants(part.effects)[key] for key in ("c1", "c2")) for part in parts(problem))
@@ -103,20 +103,20 @@ def _springs(problem: MuscleProblem, attached: AttachedVertices) -> str:
     """The distance between the springs of FEBio and of the reference, and their stiffness in total and against rotation."""
     skin, found = problem.attached_skins[attached.attachment], febio_mesh.spring_points(problem, attached)
     points, areas = found.points, corner_areas(found.corners) / febio_mesh.SHRUNK
-    assert attached.stiffness is not None  # one by springs
+    assert attached.stiffness is not None  # the attachment is by springs
     ours, theirs = (attached.stiffness * float(one.sum()) for one in (skin.areas, areas))
     centre, away = skin.areas @ skin.points / skin.areas.sum(), np.linalg.norm(points - skin.points[found.of], axis=1)
     off = float(np.linalg.norm(areas @ points / areas.sum() - centre))
     turning = eigh(_turning(points - centre, areas), _turning(skin.points - centre, skin.areas), eigvals_only=True)
     return (
-        f'attachment "{attached.attachment}": springs at the nearest points of the tetrahedra, {away.mean():.2g} mm (mean) to '
-        f"{away.max():.2g} mm from those of the reference on the surface: {theirs:.4g} N/mm in all for {ours:.4g}, their middle "
-        f"{off:.2g} mm away, {turning[0]:.3f} to {turning[-1]:.3f} times as stiff against turning"
+        f'attachment "{attached.attachment}": springs act at the nearest points of the tetrahedra, {away.mean():.2g} mm (mean) to '
+        f"{away.max():.2g} mm from the springs of the reference. Their stiffness is {theirs:.4g} instead of {ours:.4g} N/mm, their "
+        f"centre is {off:.2g} mm away, and they are {turning[0]:.3f} to {turning[-1]:.3f} times as stiff against rotation"
     )
 
 
 def _turning(arms: Floats, areas: Floats) -> Floats:
-    """The moment of inertia (3, 3) [mm4] of ``areas`` (n,) at ``arms`` (n, 3): the stiffness against turning is in proportion."""
+    """The moment of inertia (3, 3) [mm4] of ``areas`` (n,) at ``arms`` (n, 3), proportional to the stiffness against rotation."""
     squares = np.einsum("i,ij,ik->jk", areas, arms, arms)
     return np.asarray(np.trace(squares) * np.eye(3) - squares)
 
@@ -127,7 +127,7 @@ def _overlapping(problem: MuscleProblem) -> Iterator[str]:
             radius = search_radius(problem, deep)
             assert problem.contact is not None  # as overlaps are only reported with contact
             yield (
-                f'bone "{bone}": facets of the tetrahedra begin up to {deep:.2g} mm inside, which FEBio removes in its first step, '
-                f"the reference before; its search_radius is {radius:.2g} mm, and a point deeper than that, pressed by more "
-                f"than {problem.contact.stiffness * radius:.2g} MPa, is not in contact there"
+                f'bone "{bone}": facets of the tetrahedra are up to {deep:.2g} mm inside at rest. FEBio removes this overlap in '
+                f"its first step, the reference before. With a search_radius of {radius:.2g} mm, FEBio ignores contact at deeper "
+                f"points, whose pressure exceeds {problem.contact.stiffness * radius:.2g} MPa"
             )

@@ -94,14 +94,14 @@ def free_facets(problem: MuscleProblem) -> Ints:
     away, _ = problem.exempt.away(distances(middles, problem.surface).triangle, middles)
     felt = loose[away > problem.exempt.reach]
     if len(felt) == 0:
-        got = f"no facet of the tetrahedra farther than {problem.exempt.reach:.2g} mm from what is attached"
+        got = f"no facet of the tetrahedra farther than {problem.exempt.reach:.2g} mm from attached parts"
         raise InputError("contact", got, "smaller tetrahedra (muscle.tet_size), or no effect contact")
     return felt
 
 
 class SpringPoints(NamedTuple):
     """Points of springs on the tetrahedra. ``of`` (n,): the points of the attached skin. ``points`` (n, 3) [mm]: their nearest
-    points on boundary ``facets`` (n, 3). ``corners`` (n, 3, 3) [mm]: small triangles about ``points`` that face the attached skin.
+    points on boundary ``facets`` (n, 3). ``corners`` (n, 3, 3) [mm]: small triangles around ``points`` that face the attached skin.
     """
 
     of: Ints
@@ -207,7 +207,7 @@ class Mesh:
 
     @staticmethod
     def surface(mesh: Element, name: str, kind: str, facets: Ints) -> None:
-        """Add a surface with this ``name`` of ``facets`` (m, 3 or 6) of a ``kind``; their nodes count from 0."""
+        """Add a surface with this ``name`` of ``facets`` (m, 3 or 6) of a ``kind``, whose nodes count from 0."""
         rows(SubElement(mesh, "Surface", name=name), kind, (facets + 1).tolist())
 
     @staticmethod

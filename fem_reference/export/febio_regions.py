@@ -1,4 +1,4 @@
-"""Regions in FEBio's input file: tetrahedra with nearly the same parameters are a part with one material.
+"""Regions in FEBio's input file: tetrahedra with nearly the same parameters form a part with one material.
 
 The bulk modulus of an uncoupled material in FEBio is one number, so a map of element data cannot represent a region.
 """
@@ -86,7 +86,7 @@ def _parameters(problem: MuscleProblem, known: dict[str, Floats]) -> list[tuple[
 
 
 def _levels(key: str, values: Floats) -> Ints:
-    """The number (m,) of the interval that each of ``values`` (m,) of a parameter is in."""
+    """The number (m,) of the interval to which each of the ``values`` (m,) of a parameter belongs."""
     least = max(_LEAST * float(values.max()) if key in _OF_FIBRES else 0.0, np.finfo(float).tiny)
     return np.asarray(np.round(np.log(np.maximum(values, least)) / np.log(FACTOR)), np.int64)
 
@@ -103,8 +103,8 @@ def note(problem: MuscleProblem) -> list[str]:
     """A sentence on the parts, if there are regions."""
     many = len(parts(problem))
     text = (
-        f"regions are {many} materials, each in tetrahedra whose parameters are within a factor of {FACTOR:g} (those of "
-        f"fibres where they are at least {_LEAST:.0%} of the greatest), with their mean: "
-        "constant in each tetrahedron, at every quadrature point in the reference"
+        f"regions are {many} materials, each for tetrahedra whose parameters are within a factor of {FACTOR:g} (for fibres, "
+        f"where they are at least {_LEAST:.0%} of the greatest). A material has their mean, which is constant in each "
+        "tetrahedron; in the reference, parameters vary between quadrature points"
     )
     return [text] if many > 1 else []

@@ -79,7 +79,7 @@ def _renamed(root: Element, name: str, before: dict[str, int]) -> None:
 
 
 def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
-    """Add contact between each two muscles that may touch, in two passes with half the stiffness, as each side in the reference."""
+    """Add contact between each pair of muscles that may touch, in two passes with half the stiffness, as in the reference."""
     if not problem.pairs:
         return
     assert problem.law is not None  # as muscles touch only by a law
@@ -103,5 +103,5 @@ def notes(problem: MusclesProblem) -> list[str]:
         rest = (
             f"an overlap of {depth:.2g} mm at rest is removed at once" if depth > 0 else "they do not overlap at rest"
         )
-        between.append(f"{one} and {other} touch by FEBio's law: linear from the surface on, without smoothing; {rest}")
+        between.append(f"{one} and {other} touch by FEBio's law, which is linear and has no smoothing; {rest}")
     return own + between

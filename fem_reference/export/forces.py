@@ -1,4 +1,4 @@
-"""Forces of runs on bones, as a table and as points with vectors, and the moment arms about joints."""
+"""Forces on bones in runs, as a table and as points with vectors, and the moment arms about joints."""
 
 import math
 from collections.abc import Iterator

@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 
 INDEX = "runs.pvd"
 _NO_STATES = """
-The reference was solved without `reference.store_state = true`: the arrays that follow from its states are not here.
+The reference was solved without `reference.store_state = true`, so the arrays that follow from its states are missing.
 """
 # Results that are evaluated from states; displacement is always written.
 _EVALUATED = ("det_F", "pressure", "fibre_stretch", "fibre_stress", "von_mises")
@@ -44,7 +44,7 @@ _BARS = {"error_bar": "max", "error_bar_of_surface": "hausdorff"}
 
 
 def write(comparison: Comparison, folder: Path) -> list[str]:
-    """Write the runs of a muscle into ``folder``, completely or not at all; the names of its files. InputError if not free."""
+    """Write the runs of a muscle into ``folder``, completely or not at all; returns its file names. InputError if not free."""
     case = casefile.muscle(comparison.scene)
     with new_folder(folder) as part:
         frames = _Frames(comparison)
@@ -175,7 +175,7 @@ def _states(comparison: Comparison) -> Results | None:
     run = comparison.reference
     folder = run.folder
     if folder is None or not states.are_kept(folder, run.numbers):
-        log.info("%s keeps no states: without stress, pressure, det F and fibre stretch", run.name)
+        log.info("%s keeps no states: stress, pressure, det F and fibre stretch are left out", run.name)
         return None
     return results.of_run(folder, comparison.scene)
 

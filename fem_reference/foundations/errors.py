@@ -9,7 +9,7 @@ _SHOWN = 400
 
 
 class InputError(Exception):
-    """Unusable input: its place (file and key), the given value and the wanted one.
+    """Unusable input: its place (file and key), the given value and the wanted value.
 
     >>> str(InputError("case.toml: effect[0].mu", '"1 mm"', "a pressure"))
     'case.toml: effect[0].mu: got "1 mm", want a pressure'

@@ -37,7 +37,7 @@ def _checked(value: object) -> str:
     except (SyntaxError, InputError, RecursionError) as error:
         raise ValueError(_WANT) from error
     except ArithmeticError:
-        pass  # still a formula, although it has no finite value at the point tried
+        pass  # still a formula, although it has no finite value at the tested point
     return value
 
 

@@ -2,7 +2,7 @@
 
 Hierarchical modelling chooses the parts of a model by an indicator of the modelling error (Oden and Prudhomme 2002,
 doi 10.1006/jcph.2002.7183). Here the indicators are the displacement [mm] and the stress [MPa] due to an effect, estimated from
-rest geometry, motion and parameters, and compared with the accuracy. An isometric contraction causes stress and no displacement.
+rest geometry, motion and parameters, and compared with tolerances. An isometric contraction causes stress and no displacement.
 """
 
 from collections.abc import Mapping
@@ -78,7 +78,7 @@ class Estimates:
         return float(0.3 * middle) / (1 + self.taut(self.tension))
 
     def taut(self, pull: float) -> float:
-        """Stiffness that such a beam gains from the ``pull`` [MPa] of its fibres, relative to its bending stiffness."""
+        """Stiffness that the beam of :meth:`bend` gains from the ``pull`` [MPa] of its fibres, over its bending stiffness."""
         return pull / self.shear * (self.length / self.thickness) ** 2 / 12
 
     def draw(self, force: float) -> float:
@@ -95,7 +95,7 @@ class Estimates:
 
     def straighten(self, pull: float) -> float:
         """Displacement [mm] of the surface, root mean square, by the ``pull`` [MPa] of fibres in a beam with clamped ends: at most
-        0.6 of the beam's sag, against its bending stiffness; inclined fibres also shear the beam. Without both clamps it shortens.
+        0.6 of the beam's sag, against its bending stiffness; inclined fibres also shear the beam. A beam with a free end shortens.
         """
         if self.fixed < 2:
             return self.shorten(pull, 0.3)

@@ -1,4 +1,4 @@
-"""Loads on a body: their amounts over time, their force and moment, and the integrals of the body's shape for these."""
+"""Loads on a body: their amounts over time, their force and moment, and the integrals over the body that loads need."""
 
 from typing import NamedTuple, Protocol
 

@@ -75,7 +75,7 @@ class State:
 
     @property
     def cofactors(self) -> Sequence[Sequence[Any]]:
-        """``J F^-T`` (3, 3): maps an area vector at rest to the deformed one (Nanson)."""
+        """``J F^-T`` (3, 3): maps an area vector at rest to the deformed area vector (Nanson)."""
         F = self.F
         after = {0: (1, 2), 1: (2, 0), 2: (0, 1)}
         return [

@@ -126,7 +126,7 @@ def tet_volumes(points: Floats, tets: Ints) -> Floats:
 
 
 def upright(points: Floats, tets: Ints) -> Ints:
-    """The ``tets`` (k, 4) between ``points`` (n, 3), those of negative volume with two corners exchanged."""
+    """The ``tets`` (k, 4) between ``points`` (n, 3), with two corners exchanged in each tet of negative volume."""
     return np.where((tet_volumes(points, tets) < 0)[:, None], tets[:, [0, 2, 1, 3]], tets)
 
 
@@ -145,7 +145,7 @@ def boundary(tets: Ints) -> tuple[Ints, Ints]:
 
 
 def united(parts: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
-    """The points (n, d) and cells (m, k) of all ``parts``, part after part, whose cells count the points of their own part."""
+    """The points (n, d) and cells (m, k) of all ``parts`` together; the given cells of a part refer to the points of this part."""
     starts = np.cumsum([0, *(len(points) for points, _ in parts)])
     cells = [own + start for (_, own), start in zip(parts, starts, strict=False)]
     return np.concatenate([points for points, _ in parts]), np.concatenate(cells)
@@ -168,7 +168,7 @@ def check_finite(surface: Surface) -> None:
 def check_corners(surface: Surface) -> None:
     """InputError if a triangle has a vertex that does not exist."""
     if surface.triangles.min(initial=0) < 0 or surface.triangles.max(initial=-1) >= len(surface.points):
-        want = f"0 to {len(surface.points) - 1}"
+        want = f"vertices from 0 to {len(surface.points) - 1}"
         raise InputError(surface.place, "a triangle with a vertex that does not exist", want)
 
 
@@ -182,8 +182,8 @@ def check_closed(surface: Surface) -> Surface:
     directed = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     edges, sides = np.unique(np.sort(directed, axis=1), axis=0, return_counts=True)
     for wrong, what, want in (
-        (edges[sides == 1], "edges of one triangle only", "a closed surface"),
-        (edges[sides > 2], "edges of more than two triangles", "a manifold surface"),
+        (edges[sides == 1], "edges that belong to only one triangle", "a closed surface"),
+        (edges[sides > 2], "edges that belong to more than two triangles", "a manifold surface"),
     ):
         if len(wrong):
             first = place_of(points[wrong[0]].mean(axis=0))
@@ -208,7 +208,7 @@ def twins(triangles: Ints) -> Ints:
 
 def corner_fans(one: Ints, other: Ints, count: int) -> Ints:
     """The number (count,) of the fan of each corner of triangles: corners around a vertex are in one fan if edges connect their
-    triangles. The sides ``one`` (e,) and ``other`` (e,) of each edge are numbered as by :func:`twins`.
+    triangles. The sides ``one`` (e,) and ``other`` (e,) of each edge are numbered as in :func:`twins`.
     """
     after_one, after_other = (side - side % 3 + (side + 1) % 3 for side in (one, other))
     return connected_parts(np.concatenate([one, after_one]), np.concatenate([after_other, other]), count)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def names(places: Iterable[str]) -> tuple[str, ...]:
-    """The names of the modules in the folders ``places``, sorted; each folder is listed again once a file was added or removed."""
+    """The names of the modules in the folders ``places``, sorted; a folder is listed again after a file is added or removed."""
     return _listed(tuple((place, Path(place).stat().st_mtime_ns) for place in places if Path(place).is_dir()))
 
 

@@ -1,4 +1,4 @@
-"""Small files of C, compiled once for this machine and kept."""
+"""Small C files, compiled once for this machine and kept."""
 
 import hashlib
 import os
@@ -24,8 +24,8 @@ def machine() -> str:
 
 
 def library(source: Path, flags: Sequence[str], folder: Path) -> CDLL:
-    """The functions of a C file, compiled with ``flags`` and kept in a ``folder``; OSError without a compiler or such a folder,
-    RuntimeError with the compiler's message where it cannot compile the file.
+    """The functions of a C file, compiled with ``flags`` and kept in a ``folder``; OSError without a compiler or the folder,
+    RuntimeError with the compiler's message if it cannot compile the file.
     """
     compiler = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()
     key = hashlib.sha256("\n".join([source.read_text(encoding="utf-8"), *compiler, *flags, machine()]).encode())

@@ -23,7 +23,7 @@ def only_record(module: ModuleType, places: tuple[str, ...], kinds: tuple[type[R
     name = module.__name__.rpartition(".")[2]
     found = [place for place in places if (Path(place) / f"{name}.py").is_file()]
     if len(found) > 1:
-        raise InputError(SETTING, f'"{name}" in {" and in ".join(found)}', "effects of different names")
+        raise InputError(SETTING, f'"{name}" in {" and in ".join(found)}', "effects with different names")
     own = [one for one in vars(module).values() if isinstance(one, type) and one.__module__ == module.__name__]
     records = [one for one in own if issubclass(one, kinds)]
     if len(records) != 1:

@@ -12,12 +12,12 @@ Progress = Callable[[str], object]
 
 @contextmanager
 def reported(progress: Progress | None) -> Iterator[None]:
-    """A context in which each line of progress goes to ``progress``; InputError unless it can be called, or is None."""
+    """A context in which each line of progress goes to ``progress``; InputError unless it is callable or None."""
     if progress is None:
         yield
         return
     if not callable(progress):
-        raise InputError("progress", said(progress), "a function of a line, such as print, or None")
+        raise InputError("progress", said(progress), "a function that takes a line, such as print, or None")
     log = logging.getLogger("fem_reference")
     handler, level = _Calling(progress), log.level
     log.addHandler(handler)

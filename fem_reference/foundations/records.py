@@ -16,7 +16,7 @@ from fem_reference.foundations.errors import InputError
 class Record(BaseModel):
     """A frozen record whose keys are all known, whose values have the declared types, and whose numbers are finite.
 
-    Text and truth values are not accepted as numbers; an integer is accepted where a float is wanted.
+    Text and Boolean values are not accepted as numbers; an integer is accepted as a float.
     """
 
     model_config = ConfigDict(
@@ -36,7 +36,7 @@ def rule(holds: Callable[[Any], object], want: str) -> Any:
 
 
 def key_rule(key: str, holds: Callable[[Any, dict[str, Any]], object], want: str) -> Any:
-    """A check of a ``key`` of a record, as :func:`rule`; ``holds`` gets its value, and those of the keys before it by name."""
+    """A check of a ``key`` of a record, as :func:`rule`; ``holds`` gets its value, and earlier values by their keys."""
 
     def check(value: Any, info: Any) -> Any:
         if not holds(value, info.data):
@@ -60,7 +60,7 @@ def increasing(values: Sequence[float] | None, want: str) -> Any:
 
 
 def directed(vector: tuple[float, float, float], name: str) -> tuple[float, float, float]:
-    """The ``vector``; ValueError, with its ``name``, where its length is not from 1e-9 to 1e9."""
+    """The ``vector``; ValueError, with its ``name``, unless its length is from 1e-9 to 1e9."""
     if not 1e-9 < math.hypot(*vector) < 1e9:
         raise ValueError(f"{name} that is not zero, with a length from 1e-9 to 1e9")
     return vector
@@ -75,13 +75,13 @@ def check_name(name: str) -> str:
 
 def _check_file_name(name: str) -> str:
     if not re.fullmatch(rf"[\w-][\w.-]{{0,{_LONGEST_NAME - 1}}}", name):
-        raise ValueError(f"a name of 1 to {_LONGEST_NAME} letters, digits and . _ -, with no dot first")
+        raise ValueError(f"a name of 1 to {_LONGEST_NAME} letters, digits and . _ -, without a dot at its start")
     return name
 
 
 def _check_part_name(name: str) -> str:
     if "." in _check_file_name(name):
-        raise ValueError("a name without a dot, which follows it in names of scalars")
+        raise ValueError("a name without a dot, as a dot follows it in names of scalars")
     return name
 
 
@@ -100,7 +100,7 @@ def check_used(known: Sequence[str], uses: Sequence[tuple[str, str]], place: str
             raise InputError(join(place, key), f'"{name}"', want)
 
 
-_SHOWN = 12  # errors of one file
+_SHOWN = 12  # the greatest number of errors that are shown for a file
 _LONGEST_NAME = 100
 # A name in pages and messages.
 Name = Annotated[str, AfterValidator(check_name)]
@@ -116,7 +116,7 @@ def parse[R](record: type[R], table: object, place: str) -> R:
         strict = issubclass(record, Record)
         return TypeAdapter(record).validate_python(_turned(table, list, tuple) if strict else table)
     except RecursionError as error:
-        raise InputError(place, "tables inside tables without end", "the keys of a file") from error
+        raise InputError(place, "tables that are nested too deeply", "the keys of a file") from error
     except ValidationError as error:
         # Unknown keys come first: naming a mistyped key helps more than reporting that the intended key is missing.
         wrong = sorted(_own(error.errors()), key=lambda one: one["type"] != "extra_forbidden")
@@ -130,7 +130,7 @@ def _own(errors: Sequence[Any]) -> list[Any]:
 
 
 def together(wrong: Sequence[InputError]) -> InputError:
-    """One error for all that are ``wrong``, at most one for each key, at the place of the first."""
+    """One error that lists all errors ``wrong``, at most one for each key, at the place of the first."""
     places = {str(one.place): one for one in reversed(wrong)}
     first, *others = sorted(places.values(), key=wrong.index)
     if not others:
@@ -141,7 +141,7 @@ def together(wrong: Sequence[InputError]) -> InputError:
 
 
 def _turned(value: Any, kind: type[Sequence[Any]], into: Callable[[Iterator[Any]], Any]) -> Any:
-    """A ``value`` of a file with all sequences of a ``kind``, lists of files or tuples of records, turned ``into`` the other."""
+    """A ``value`` of a file with all sequences of a ``kind`` (lists of files or tuples of records) converted by ``into``."""
     if isinstance(value, dict):
         return {key: _turned(inside, kind, into) for key, inside in value.items()}
     return into(_turned(inside, kind, into) for inside in value) if isinstance(value, kind) else value
@@ -189,7 +189,7 @@ def _known(record: Any, path: tuple[int | str, ...]) -> list[str]:
 
 
 def keys(record: Any) -> list[str]:
-    """The keys of a ``record`` in files; none where it is not a record."""
+    """The keys of a ``record`` in files; none if it is not a record."""
     fields = getattr(record, "model_fields", {})
     return sorted(field.alias or name for name, field in fields.items() if not field.exclude)
 

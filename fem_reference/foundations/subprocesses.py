@@ -62,7 +62,7 @@ def lives(process: int) -> bool:
 
 
 def forget_peak_memory() -> None:
-    """Measure the peak memory of this process from now on, where the system can (Linux)."""
+    """Measure the peak memory of this process from now on, if the system supports this (Linux)."""
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
 
@@ -73,7 +73,7 @@ def processor_times(process: int, *, of_ended: bool = False) -> dict[int, float]
     """
     parents, times = dict[int, int](), dict[int, float]()
     for folder in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError, ValueError, IndexError):  # it may end meanwhile
+        with suppress(OSError, ValueError, IndexError):  # the process may end meanwhile
             fields = (folder / "stat").read_bytes().rpartition(b")")[2].split()
             number = int(folder.name)
             parents[number] = int(fields[1])
@@ -86,7 +86,7 @@ def processor_times(process: int, *, of_ended: bool = False) -> dict[int, float]
 
 
 class MachineTime(NamedTuple):
-    """A moment: the time by the clock [s], the processor time [s] of this process and its descendants, and the processor time of
+    """A moment: the clock time [s], the processor time [s] of this process and its descendants, and the processor time of
     all processes on the machine, NaN if the system does not report it.
     """
 
@@ -106,7 +106,7 @@ class MachineTime(NamedTuple):
         return cls(time.perf_counter(), sum(processor_times(os.getpid(), of_ended=True).values()), busy)
 
     def load(self) -> float | None:
-        """The share of the machine that other processes have used since then, None if the system does not report it."""
+        """The share of the machine that other processes have used since this moment, None if the system does not report it."""
         now = MachineTime.now()
         capacity = (now.seconds - self.seconds) * (os.cpu_count() or 1)
         share = (now.all - self.all - (now.ours - self.ours)) / capacity if capacity > 0 else math.nan
@@ -114,7 +114,7 @@ class MachineTime(NamedTuple):
 
 
 def spent_since(before: MachineTime) -> dict[str, str]:
-    """The processor time of this process since a moment and the load by other processes, as provenance of times by the clock."""
+    """The processor time of this process since a moment and the load by other processes, as provenance of clock times."""
     ours, load = MachineTime.now().ours - before.ours, before.load()
     found = {"processor time": f"{ours:.1f} s"}
     return found if load is None else found | {"load by other processes": f"{100 * load:.0f} % of the machine"}
@@ -130,14 +130,14 @@ def peak_memory(process: int | None = None) -> float:
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """A folder in the system's temporary one, locked as long as this process lives."""
+    """A folder in the system's temporary folder, locked as long as this process lives."""
     _clear(Path(tempfile.gettempdir()))
     with tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True) as name, FileLock(Path(name) / _LOCK):
         yield Path(name)
 
 
 def _clear(root: Path) -> None:
-    """Remove folders that killed processes left; folders without permission to remove stay."""
+    """Remove folders that killed processes left; folders that may not be removed stay."""
     for path in root.glob(f"{_PREFIX}*"):
         with suppress(OSError, Timeout):
             if time.time() - path.stat().st_mtime > _SETTLED and (path / _LOCK).is_file():

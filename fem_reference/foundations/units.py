@@ -1,4 +1,4 @@
-"""Text with a unit -> a number in mm, N, MPa, s, rad, tonne: the only module in which a unit is text.
+"""Conversion of text with a unit to a number in mm, N, MPa, s, rad, tonne: only in this module a unit is text.
 
 Scene records consist of the annotated types: a field of type ``Pressure`` takes ``"30 kPa"`` and stores 0.03.
 """
@@ -31,7 +31,7 @@ class Kind(NamedTuple):
 
 
 _FILE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-# The kinds by name, and the number of internal units in a common unit, by that and the internal one.
+# The kinds by name, and the number of internal units in a common unit, by the common and the internal unit.
 KINDS = TypeAdapter(dict[str, Kind]).validate_python(_FILE["kind"])
 COMMON: dict[tuple[str, str], float] = {
     (unit, inside): factor for inside, units in _FILE["common"].items() for unit, factor in units.items()
@@ -40,7 +40,7 @@ COMMON: dict[tuple[str, str], float] = {
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
 # Forbidden in a unit: an exponent that is not an integer of one or two digits, or that has an exponent itself, as in mm^9^9^9.
 _NO_UNIT = re.compile(r"(?:\^|\*\*)(?!\s*[+-]?\d{1,2}(?![\w.])(?!\s*(?:\^|\*\*)))", re.ASCII)
-# The most characters of a quantity.
+# The greatest number of characters in a quantity.
 _LONGEST = 100
 # The smallest accepted quantity above zero, in its internal unit.
 _SMALLEST = 1e-30
@@ -56,7 +56,7 @@ def _registry() -> Any:
 
 
 def quantity(text: object, kind: str) -> float:
-    """Read ``text``, a number and then its unit, as a quantity of ``kind`` (``"a pressure"``); ValueError when it is none.
+    """Read ``text``, a number and then its unit, as a quantity of ``kind`` (``"a pressure"``); ValueError if it is not.
 
     A fraction is in per cent or has no unit.
 
@@ -71,7 +71,7 @@ def quantity(text: object, kind: str) -> float:
         raise wrong
     try:
         value = float(number) * _factor(unit, own.unit)
-    except Exception as error:  # pint raises its own errors, tokenizer errors and TypeError for text that is no unit
+    except Exception as error:  # pint raises its own errors, tokenizer errors and TypeError for text that is not a unit
         raise wrong from error
     if not math.isfinite(value):
         raise wrong
@@ -87,7 +87,7 @@ def _factor(unit: str, inside: str) -> float:
         return COMMON.get((unit, inside), 1.0)
     one = _registry().Quantity(1.0, _registry().parse_units(unit))
     factor = float(one.to(inside or "dimensionless").magnitude)
-    # To pint an angle has no dimension, its root unit distinguishes it.
+    # For pint an angle has no dimension; only its root unit distinguishes it.
     same = one.to_root_units().units == _registry().Quantity(1.0, inside).to_root_units().units
     return factor if same else math.nan
 
@@ -173,7 +173,7 @@ def kinds(annotation: Any) -> list[Any]:
 
 
 def written(value: Any, unit: str) -> Any:
-    """A number, or three, as text with its internal ``unit``; values without a unit, and texts, unchanged.
+    """A number, or three numbers, as text with the internal ``unit``; values without a unit, and texts, are unchanged.
 
     >>> written(0.01, "MPa"), written((0, 0, -1), "mm"), written("2 cm", "mm"), written(3, "")
     ('0.01 MPa', '0.0, 0.0, -1.0 mm', '2 cm', 3)

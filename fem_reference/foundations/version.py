@@ -1,4 +1,4 @@
-"""The version of the package, which pages, files and stored runs state, and the versions of others."""
+"""The version of the package, which pages, files and stored runs state, and the versions of other packages."""
 
 import importlib.metadata
 from collections.abc import Iterable

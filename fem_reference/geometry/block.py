@@ -1,4 +1,4 @@
-"""Grids of boxes, each cut into Kuhn's six tetrahedra, all along the same diagonals, so that refined grids are nested.
+"""Grids of boxes, each cut into the six Kuhn tetrahedra along the same diagonals, so that refined grids are nested.
 
 Each cell, and each of its faces, is cut along the diagonal from its lowest to its highest corner.
 """
@@ -17,9 +17,9 @@ _SAME = 1e-6  # tolerance relative to the largest edge: the precision of single-
 
 
 def fill(surface: Surface, size: float) -> TetMesh:
-    """The axis-aligned box with the closed outward ``surface``, as a grid of boxes with edges of about ``size`` [mm].
+    """The axis-aligned box bounded by the closed outward ``surface``, as a grid of boxes with edges of about ``size`` [mm].
 
-    InputError if it is not the surface of such a box, or if ``size`` is far too small or too large.
+    InputError if ``surface`` does not bound such a box, or if ``size`` is far too small or too large.
     """
     low, high = _extent(surface)
     check_size(surface, size)
@@ -29,7 +29,7 @@ def fill(surface: Surface, size: float) -> TetMesh:
 
 
 def kuhn(counts: Counts) -> tuple[Ints, Ints]:
-    """The nodes (n, 3) of a lattice of ``counts`` cells along x, y and z, z fastest, and the tets (k, 4) of its cells."""
+    """The nodes (n, 3) of a lattice of ``counts`` cells along x, y and z (z varies fastest), and the tets (k, 4) of its cells."""
     nodes = np.indices((counts[0] + 1, counts[1] + 1, counts[2] + 1)).reshape(3, -1).T
     strides = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
     lowest = np.indices(counts).reshape(3, -1).T @ strides
@@ -67,12 +67,12 @@ def _extent(surface: Surface) -> tuple[Floats, Floats]:
     corners = surface.points[surface.triangles]
     in_a_face = (np.abs(corners - low) <= near).all(axis=1) | (np.abs(corners - high) <= near).all(axis=1)
     inside = np.flatnonzero(~in_a_face.any(axis=1))
-    want = 'the surface of an axis-aligned box, or the muscle.mesher "quality"'
+    want = 'the surface of an axis-aligned box, or muscle.mesher = "quality"'
     if len(inside):
         first = place_of(corners[inside[0]].mean(axis=0))
-        got = f"{len(inside)} triangles in no face of the box around it, the first at {first}"
+        got = f"{len(inside)} triangles outside the faces of the bounding box, the first at {first}"
         raise InputError(surface.place, got, want)
     volume, wanted = enclosed_volume(surface.points, surface.triangles), float(np.prod(high - low))
     if not abs(volume - wanted) <= wanted / 2:
-        raise InputError(surface.place, f"{volume:.6g} mm3 in a box of {wanted:.6g} mm3", want)
+        raise InputError(surface.place, f"an enclosed volume of {volume:.6g} mm3 in a box of {wanted:.6g} mm3", want)
     return low, high

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 
-# Cells of the search grid along the longest edge of the common region of two sets.
+# The number of cells of the search grid along the longest edge of the common region of two sets.
 _CELLS = 16
 
 
 @dataclass(frozen=True, eq=False)
 class Boxes:
-    """n boxes from ``low`` to ``high`` [mm], by axis: both (3, n)."""
+    """n boxes from the corners ``low`` (3, n) [mm] to the corners ``high`` (3, n) [mm]."""
 
     low: Floats
     high: Floats
@@ -27,7 +27,7 @@ class Boxes:
 
     @cached_property
     def corners(self) -> tuple[Floats, Floats]:
-        """The box (3, 1) [mm] around all low corners."""
+        """The lowest and the highest coordinates (3, 1) [mm] of all low corners."""
         return self.low.min(axis=1, keepdims=True), self.low.max(axis=1, keepdims=True)
 
 
@@ -42,7 +42,7 @@ def boxes_of(surface: Surface) -> Boxes:
 @lru_cache(maxsize=16)
 def bounds(surface: Surface) -> tuple[Floats, Floats]:
     """The lowest and the highest coordinates (3,) [mm] of the points of a ``surface``."""
-    columns = np.ascontiguousarray(surface.points.T)  # along which numpy is ten times as fast
+    columns = np.ascontiguousarray(surface.points.T)  # numpy is ten times as fast along contiguous rows
     return columns.min(axis=1), columns.max(axis=1)
 
 
@@ -52,18 +52,18 @@ def around(points: Floats, reach: Floats) -> Boxes:
 
 
 def touching(one: Boxes, other: Boxes) -> tuple[Ints, Ints]:
-    """The indices (k,) and (l,) of the boxes of each set that may touch a box of the other: all that touch, and few others."""
+    """The indices (k,) and (l,) of the boxes of each set that may touch a box of the other: every box that does, and few others."""
     others = reached(one, other)
     return _near(other, others, one), others
 
 
 def reached(one: Boxes, other: Boxes) -> Ints:
-    """The indices (k,) of the boxes of ``other`` that may touch a box of ``one``: all that touch, and few others."""
+    """The indices (k,) of the boxes of ``other`` that may touch a box of ``one``: every box that does, and few others."""
     return _near(one, np.arange(one.low.shape[1]), other)
 
 
 def _near(one: Boxes, some: Ints, other: Boxes) -> Ints:
-    """The boxes (k,) of ``other`` whose low corner is in a grid cell that ``some`` of ``one`` reach, enlarged by the largest."""
+    """The boxes (k,) of ``other`` with the low corner in a grid cell that ``some`` of ``one``, enlarged by the largest, reach."""
     if not (len(some) and other.low.size):
         return np.zeros(0, np.int64)
     begin, end = np.take(one.low, some, axis=1) - other.largest, np.take(one.high, some, axis=1)
@@ -91,7 +91,7 @@ def _within(begin: Floats, end: Floats, low: Floats, high: Floats) -> Ints:
 
 
 def _covered(begin: Ints, end: Ints, shape: Ints) -> NDArray[np.bool_]:
-    """Mask of the cells of a grid of ``shape`` in one of the ranges from ``begin`` to ``end`` (3, n), both included."""
+    """Mask of the cells of a grid of ``shape`` that lie in any range from ``begin`` to ``end`` (3, n), both included."""
     sides, shape = (begin, end + 1), shape + 1
     steps = np.zeros(int(shape.prod()))
     for corner in np.ndindex(2, 2, 2):

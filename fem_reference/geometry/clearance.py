@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats
 
-# Weights that make the four Bernstein coefficients of a cubic (rows) from the B-spline coefficients that reach into its cell.
+# Weights that give the four Bernstein coefficients of a cubic (rows) from the four B-spline coefficients of its cell.
 _BERNSTEIN = np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6
-_CHUNK = 20_000  # cells per chunk
+_CHUNK = 20_000  # the number of cells per chunk
 
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """``away`` (i, j, k): the distance [mm] from each node to the nearest cell in which the spline may fall to the level. Nodes
+    """``away`` (i, j, k): the distance [mm] from each node to the nearest cell in which the spline may fall to the level. The nodes
     are ``spacing`` [mm] apart, the first at ``origin``; outside the grid the spline stays above the level.
     """
 
@@ -24,7 +24,7 @@ class Clearance:
     spacing: float
 
     def __call__(self, points: Floats) -> Floats:
-        """A lower bound (n,) of the clearance [mm] of ``points`` (n, 3), 0 or below if no clearance is certain; NaN for NaN."""
+        """A lower bound (n,) on the clearance [mm] of ``points`` (n, 3), 0 or below if no clearance is certain; NaN for NaN."""
         at = (points - self.origin) / self.spacing
         known = np.isfinite(at).all(axis=1)
         at = np.where(known[:, None], at, 0.0)
@@ -32,7 +32,7 @@ class Clearance:
         nodes = np.rint(within).astype(np.int64)
         found = self.away[tuple(nodes.T)] - self.spacing * np.linalg.norm(within - nodes, axis=1)
         beyond = self.spacing * np.linalg.norm(at - within, axis=1)
-        # The grid is convex: from a point outside, the path beyond its nearest grid point makes no acute angle with the path to it.
+        # The grid is convex, so the path to the grid point nearest to an outside point makes no acute angle with the path beyond.
         found = np.where(beyond > 0, np.hypot(beyond, np.maximum(found, 0)), found)
         return np.where(known, found, np.nan)
 
@@ -50,9 +50,9 @@ def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float
 
 
 def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
-    """Mask of the cells, three fewer along each axis, in which a spline may be at ``level`` or below. In a cell the spline is at
-    least the least of its 64 coefficients and of its Bernstein coefficients. It is at most the greatest coefficient, so cells deep
-    inside need no check.
+    """Mask of the cells, three fewer along each axis, in which a spline may be at ``level`` or below. In a cell, the least
+    of the 64 coefficients bounds the spline from below, and the least Bernstein coefficient does so more closely. The greatest
+    coefficient bounds it from above, so cells deep inside need no check.
     """
     found = _least_of_four(coefficients) <= level
     cells = np.argwhere(found & (-_least_of_four(-coefficients) > level))

@@ -1,4 +1,4 @@
-"""Coarsening of surfaces: fewer and well-shaped triangles on a fine surface."""
+"""Coarsening of surfaces: a fine surface remeshed with fewer, well-shaped triangles."""
 
 import igl
 import numpy as np
@@ -8,22 +8,22 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volum
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.edges import Edges
 
-# Chosen by trials on four hip muscles and a box; more rounds improve nothing.
+# Chosen by trials on four hip muscles and a box; more rounds bring no improvement.
 _ROUNDS = 6
-# A vertex may move along a direction if the squares of the normals around the vertex have less than this share in this direction:
-# the vertex then stays on its plane or sharp edge. Above 0.05 a thin rim shrinks, below 0.02 slivers remain.
+# A vertex may move along a direction if that direction has less than this share of the squared normals around the vertex:
+# the vertex then stays on its plane or sharp edge. Above 0.05 a thin rim shrinks; below 0.02 slivers remain.
 _FREE = 0.03
-# Distance of the pole of inversion in diagonals of the body. A nearer pole moves sharp edges, a farther one leaves flat parts flat.
+# Distance of the pole of inversion, in diagonals of the body: a nearer pole moves sharp edges, a farther one leaves parts flat.
 _POLE = 6.0
 _NEARLY_FLAT = np.cos(np.radians(30))
 _TINY = np.finfo(float).tiny
 
 
 def coarsen(surface: Surface, count: int) -> Surface:
-    """A closed surface of about ``count`` triangles on a closed ``surface``, with its sharp edges and its enclosed volume.
+    """A closed surface of about ``count`` triangles that approximates a closed ``surface`` and keeps its sharp edges and volume.
 
-    Edges collapse by quadric error (Garland and Heckbert 1997, doi 10.1145/258734.258849), then edges flip towards
-    Delaunay and vertices slide to the middle of their neighbours, back on ``surface`` after each round.
+    Edges collapse by quadric error (Garland and Heckbert 1997, doi 10.1145/258734.258849). Then edges flip towards a Delaunay
+    triangulation, vertices slide towards the middle of their neighbours, and each round moves them back onto ``surface``.
     """
     points, triangles = _collapse(surface, count)
     for _ in range(_ROUNDS):
@@ -46,7 +46,7 @@ def resampled(surface: Surface, power: int) -> Surface:
 
 
 def _collapse(surface: Surface, count: int) -> tuple[Floats, Ints]:
-    """Points and triangles after quadric collapses of the inverted surface: in a flat part quadrics would be undetermined."""
+    """Points and triangles after quadric collapses of the inverted surface: the quadrics of a flat part would be singular."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     radius = _POLE * float(np.linalg.norm(high - low))
     pole = (low + high) / 2 + radius * np.array([0.48, 0.6, 0.64])
@@ -61,7 +61,7 @@ def _invert(points: Floats, pole: Floats, radius: float) -> Floats:
 
 
 def slide(points: Floats, triangles: Ints) -> Floats:
-    """``points`` (n, 3) [mm] moved to the area-weighted means of the ``triangles`` (m, 3) around, along free directions only."""
+    """``points`` (n, 3) [mm] moved to the area-weighted means of adjacent ``triangles`` (m, 3), along free directions only."""
     areas = triangle_areas(points, triangles)
     total = _around(areas, triangles, len(points))[:, None]
     pulled = _around(areas[:, None] * points[triangles].mean(axis=1), triangles, len(points))
@@ -93,7 +93,7 @@ def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
 
 
 def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
-    """The ``points`` (n, 3) [mm] of a closed outward surface, moved by one distance along their normals to enclose a ``volume``."""
+    """The ``points`` (n, 3) [mm] of a closed outward surface, moved equally along their normals to enclose a ``volume``."""
     for _ in range(3):
         across = _around(normals(points[triangles]), triangles, len(points))
         across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), _TINY)
@@ -103,7 +103,7 @@ def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
 
 
 def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> Ints:
-    """The triangles (m, 3) of a closed surface after edge flips towards Delaunay, until no flip is left (at most 20 passes).
+    """The triangles (m, 3) of a closed surface after edge flips towards a Delaunay triangulation (at most 20 passes).
     Edges between triangles of different ``labels`` (m,) stay, so that the labels remain valid.
     """
     for _ in range(20):
@@ -115,7 +115,7 @@ def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> I
 
 
 def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
-    """The triangles after flips of edges with a gain, the greatest first, each triangle at most once; the same array if none."""
+    """The triangles after edge flips with a gain, the greatest first, each triangle at most once; the same array without flips."""
     edges = Edges.of(Surface(points, triangles))
     gain = _flip_gain(points, edges)
     if labels is not None:
@@ -136,7 +136,7 @@ def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
 
 
 def _flip_gain(points: Floats, edges: Edges) -> Floats:
-    """The excess (e,) [rad] over pi of the sum of the angles opposite to each edge; 0 if a flip is useless or would bend."""
+    """The excess (e,) [rad] over pi of the sum of the angles opposite to each edge; 0 if a flip is not useful or bends it."""
     a, b, c, d = (points[corner] for corner in (*edges.ends.T, *edges.opposite.T))
     excess = _angle(a - c, b - c) + _angle(a - d, b - d) - np.pi
     before = _cosine(np.cross(b - a, c - a), np.cross(a - b, d - b))

@@ -16,14 +16,14 @@ _NUDGE = 1e-4
 # The unit square's boundary, counter-clockwise from the middle of its side x = 1, by shares of its length.
 _SHARES = (0, 1 / 8, 3 / 8, 5 / 8, 7 / 8, 1)
 _SQUARE = ((1, 1, 0, 0, 1, 1), (0.5, 1, 1, 0, 0, 0.5))
-_SAMPLES = 360  # points on each rim that are matched
-_REACH = 60  # samples by which a match may deviate from the common shift of the rim, either way
-_STEPS = (-1, 0, 1, 2, 3)  # samples by which consecutive matches may differ, so that matches stay in order
+_SAMPLES = 360  # the number of points on each rim that are matched
+_REACH = 60  # the number of samples by which a match may deviate from the common shift of the rim, either way
+_STEPS = (-1, 0, 1, 2, 3)  # numbers of samples by which consecutive matches may differ, so that matches stay in order
 _STIFFNESS = (
     0.01  # share of a rim's length: the distance of points that costs as much as stretching a rim to twice its length
 )
-_WINDOW = 9  # samples in the moving mean that smooths the matches
-_LEAST = 0.1  # weight of the common shift in a match, so that no two points coincide
+_WINDOW = 9  # the number of samples in the moving mean that smooths the matches
+_LEAST = 0.1  # the weight of the common shift in a match, so that no two points coincide
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class CrossSection:
 
     @property
     def moments(self) -> tuple[Floats, Floats]:
-        """The centroid (3,) [mm] and the mean product (3, 3) [mm2] of the components of the distance from it."""
+        """The centroid (3,) [mm], and the second moments (3, 3) [mm2] of area about it, divided by the area."""
         corners = self.points[self.triangles]
         areas = np.linalg.norm(normals(corners), axis=1) / 2
         centre = areas @ corners.mean(axis=1) / areas.sum()
@@ -56,7 +56,7 @@ class CrossSection:
         """The position (k,) of each point of the rim around the unit square, in turns from the middle of the square's side x = 1;
         ``first`` (3,) is the direction of its first side.
 
-        It is a share of length after a stretch that makes the section as wide as high, so a rectangle is mapped linearly.
+        The position is a share of length after a stretch that makes width and height equal, so a rectangle is mapped linearly.
         """
         centre, product = self.moments
         axes = np.stack([first, np.cross(self.normal, first)])
@@ -116,7 +116,7 @@ def _cut(mesh: TetMesh, above: Floats) -> tuple[Ints, Floats]:
 
 
 def _greatest(points: Floats, triangles: Ints) -> CrossSection | None:
-    """The piece of the largest area, or None if it has more than one boundary."""
+    """The piece with the largest area, or None if it has more than one boundary."""
     _, pieces = igl.facet_components(triangles.astype(np.int64))
     areas = np.bincount(pieces, weights=np.linalg.norm(normals(points[triangles]), axis=1))
     triangles = triangles[pieces == np.argmax(areas)]
@@ -133,8 +133,8 @@ def carried(known: CrossSection, turns: Floats, other: CrossSection) -> Floats:
     """The positions (m,) of the rim of the ``other`` section along the unit square, from the positions ``turns`` (n,) of the
     ``known`` rim.
 
-    The points of the other rim are matched in order with points of the known rim, so that the mean square of their distance across
-    the muscle plus a cost of stretch is least.
+    The points of the other rim are matched, in order, with points of the known rim. The matching minimises the mean square of their
+    distance across the muscle plus a cost of stretch.
     """
     normal = known.normal + other.normal
     normal /= max(float(np.linalg.norm(normal)), 1e-12)
@@ -157,7 +157,7 @@ def _shares(rim: Floats) -> Floats:
 
 
 def _at(places: Floats, shares: Floats, rim: Floats) -> Floats:
-    """Points (n, 3) at ``places`` (n,), shares of the length, of a closed ``rim`` (k, 3) whose points are at ``shares`` (k,)."""
+    """Points (n, 3) on a closed ``rim`` (k, 3) at ``places`` (n,); these, and the ``shares`` (k,) of its points, are in turns."""
     return np.stack([np.interp(places, shares, axis, period=1) for axis in rim.T], axis=1)
 
 
@@ -176,7 +176,7 @@ def _nearest(rim: Floats, shares: Floats, point: Floats) -> float:
 
 
 def _matched(one: Floats, other: Floats) -> Floats:
-    """The shares (n,) of its length by which each sample of a rim ``one`` (n, 3) is ahead of its match on the ``other``."""
+    """The share (n,) of the length by which each sample of the rim ``one`` (n, 3) is ahead of its match on the ``other`` rim."""
     shift = int(np.argmin([((np.roll(one, -by, axis=0) - other) ** 2).sum() for by in range(len(one))]))
     reach = range(shift - _REACH, shift + _REACH + 1)
     apart = np.stack([((np.roll(one, -by, axis=0) - other) ** 2).sum(axis=1) for by in reach], axis=1)
@@ -190,7 +190,7 @@ def _matched(one: Floats, other: Floats) -> Floats:
 
 
 def _least(apart: Floats, stiffness: float) -> Ints:
-    """The shifts (n,), from -60 to 60, of least sum of squares ``apart`` (n, 121) plus a cost of their changes; the first is 0."""
+    """The shifts (n,), from -60 to 60, with the least sum of squares ``apart`` (n, 121) plus a cost of changes; the first is 0."""
     count, width = apart.shape
     costs, steps = np.full(width, np.inf), np.zeros((count + 1, width), np.int64)
     costs[_REACH] = apart[0, _REACH]

@@ -1,8 +1,8 @@
 """Curves through a few points: the estimation techniques of the report's sections 3.1 to 3.5, for fibres and outlines.
 
 A curve is a callable from parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two formulas of the report
-have misprints: the second row of the Bezier matrix (3.1) is -3, 3, 0, 0; and (3.2) is the matrix of the uniform spline, not of the
-centripetal spline: the exponent of its knots and the tension of (3.3) are different parameters.
+have misprints. The second row of the Bezier matrix (3.1) must be -3, 3, 0, 0. The matrix (3.2) belongs to the uniform spline, not
+to the centripetal spline: the exponent of the knots and the tension of (3.3) are different parameters.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ Curve = Callable[[Floats], Floats]
 
 
 def knots(points: Floats, exponent: float = 1.0) -> Floats:
-    """Parameters (n,) of ``points`` (n, d), 0 to 1, with steps as distance**``exponent``: 0 uniform, 0.5 centripetal, 1 chordal."""
+    """Parameters (n,) of ``points`` (n, d), 0 to 1, with steps of distance**``exponent``: 0 uniform, 0.5 centripetal, 1 chordal."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if len(points) < 2 or not (steps > 0).all():
         got = f"{len(points)} points, {int((steps == 0).sum())} repeated"
@@ -28,13 +28,13 @@ def knots(points: Floats, exponent: float = 1.0) -> Floats:
 
 
 def constant(points: Floats) -> Curve:
-    """The nearest of ``points`` (n, d) by chord length (report 3.1)."""
+    """The step function with the value of the nearest of ``points`` (n, d) by chord length (report 3.1)."""
     found: Curve = scipy.interpolate.interp1d(knots(points), points, kind="nearest", axis=0)
     return found
 
 
 def linear(points: Floats) -> Curve:
-    """Straight lines between consecutive ``points`` (n, d) (report 3.1)."""
+    """Straight segments between consecutive ``points`` (n, d) (report 3.1)."""
     found: Curve = scipy.interpolate.interp1d(knots(points), points, axis=0)
     return found
 
@@ -64,10 +64,10 @@ def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
 
 
 def fourier(points: Floats) -> Curve:
-    """The discrete Fourier series of ``points`` (n, d), taken as equidistant, and as periodic up to their chord (3.4, 3.5).
+    """The discrete Fourier series of ``points`` (n, d), assumed to be equidistant (3.4, 3.5).
 
-    The chord, the straight line between both ends, is subtracted first and the remainder extended as an odd function, so that the
-    curve passes through the ends.
+    The chord, the straight line between the two ends, is subtracted first, and the remainder is extended as an odd periodic
+    function, so that the curve passes through the ends.
     """
     count = len(knots(points)) - 1
     orders, at = np.arange(1, count), np.linspace(0, 1, count + 1)

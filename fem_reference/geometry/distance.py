@@ -32,8 +32,8 @@ def distances(points: Floats, surface: Surface) -> Distances:
     """The closest point of ``surface`` for each of ``points`` (n, 3) [mm]; ValueError if a point is not finite."""
     points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
     for what, given in (("points", points), ("points of the surface", surface.points)):
-        if not np.isfinite(given).all():  # libigl would give triangles that do not exist
-            raise ValueError(f"distances: {what} that are not finite")
+        if not np.isfinite(given).all():  # libigl would return triangles that do not exist
+            raise ValueError(f"distances: the {what} are not all finite")
     if len(points) == 0:
         return Distances(np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
     vertices, triangles = surface.points, surface.triangles
@@ -45,10 +45,10 @@ def distances(points: Floats, surface: Surface) -> Distances:
     return Distances(np.sqrt(np.maximum(squares, 0)), np.asarray(triangle, np.int64), closest, inner)
 
 
-# A surface is often queried for few points at a time, and building its search tree takes as long as thousands of queries.
+# A surface is often queried for a few points at a time, and building its search tree takes as long as thousands of queries.
 @lru_cache(maxsize=8)
 def _tree(points: bytes, triangles: bytes) -> igl.AABB:
-    """A search tree of boxes for the surface with the arrays ``points``, 64 bit floats, and ``triangles``, 64 bit integers."""
+    """A search tree of boxes for the surface with the arrays ``points``, 64-bit floats, and ``triangles``, 64-bit integers."""
     tree = igl.AABB()
     tree.init(*_arrays(points, triangles))
     return tree
@@ -76,7 +76,7 @@ def _barycentric(points: Floats, corners: Floats) -> Floats:
 
 
 def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) of the ``points`` (n, 3) inside a closed ``surface``, by winding number."""
+    """Mask (n,) of the ``points`` (n, 3) inside a closed ``surface``, by their winding numbers."""
     if len(points) == 0:
         return np.zeros(0, bool)
     tree = _winding_tree(surface.points.tobytes(), surface.triangles.tobytes())
@@ -84,8 +84,8 @@ def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
 
 
 def flattened(surface: Surface, place: Floats) -> float:
-    """The error of a flat triangle on a curved surface times the radius of curvature [mm2]: its middle's distance from a sphere
-    through its corners, times the radius of the sphere. The triangle is the nearest to a ``place`` (3,) [mm].
+    """The error of a flat triangle on a curved surface, times the radius of curvature [mm2]. The error is the distance of the
+    triangle's middle from a sphere of this radius through its corners; the triangle is the nearest to a ``place`` (3,) [mm].
     """
     corners = surface.points[surface.triangles[distances(place[None], surface).triangle[0]]]
     return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6
@@ -93,11 +93,11 @@ def flattened(surface: Surface, place: Floats) -> float:
 
 @np.errstate(over="ignore", invalid="ignore")
 def outer_windings(surface: Surface) -> Floats:
-    """The winding number (m,) of the surface at a point just outside each triangle: 0 on the skin of a valid body, positive inside
-    another part of the body, negative if the triangle faces a part that is inside out; NaN if a triangle has no normal.
+    """The winding number (m,) of the surface at a point just outside each triangle. It is 0 on the skin of a valid body,
+    positive inside another part of the body, negative if the triangle faces a part that is inside out, NaN without a normal.
 
-    "Just outside" is 1e-5 of the surface's diagonal away; thinner folds are not distinguished. Winding numbers by Barill et al.
-    2018, doi 10.1145/3197517.3201337, differ by a few thousandths from the whole numbers to which they are rounded.
+    "Just outside" is 1e-5 of the surface's diagonal away; thinner folds are not distinguished. The winding numbers of Barill et
+    al. 2018, doi 10.1145/3197517.3201337, differ by a few thousandths from the whole numbers to which they are rounded.
     """
     points, triangles = surface.points - surface.points.mean(axis=0), surface.triangles
     corners = points[triangles]
@@ -111,8 +111,8 @@ def outer_windings(surface: Surface) -> Floats:
 
 
 def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
-    """A lower bound of the greatest depth [mm] of the centroids of the triangles ``some`` (m,) within another part of the closed
-    ``surface``: the distance of a centroid to the nearest opposing triangle in front of it. 0 without self-intersection.
+    """A lower bound on the greatest depth [mm] of the centroids of the triangles ``some`` (m,) within another part of the closed
+    ``surface``. The depth is the distance of a centroid to the nearest opposing triangle in front; 0 without self-intersection.
     """
     corners = surface.points[surface.triangles]
     middles, across, covered = corners.mean(axis=1), normals(corners), outer_windings(surface) > 0.5
@@ -130,7 +130,7 @@ def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
 
 
 def farthest_points(points: Floats, count: int) -> Ints:
-    """Indices (count,) of ``points`` (n, d): first the farthest from their mean, then always the farthest from those chosen."""
+    """Indices (count,) of ``points`` (n, d): first the farthest from their mean, then each farthest from all chosen before."""
     chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     away = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):

@@ -36,9 +36,9 @@ class Edges:
     def angles(self, points: Floats) -> Floats:
         """Angle (e,) [rad] from the normal of the left triangle to the normal of the right, in (-pi, pi].
 
-        0 if the two are flat, pi / 2 at the edges of a box, below 0 if the surface is hollow; NaN if a triangle has no normal. It
-        is atan2((n x m) . d, n . m) of the unit normals n, m and the direction d of the edge: report eq. 5.23 without its arccos,
-        which loses the sign and, for small angles, the digits.
+        It is 0 if the two are coplanar, pi / 2 at the edges of a box and negative at a concave edge; NaN if a triangle has no
+        normal. It equals atan2((n x m) . d, n . m) with the unit normals n, m and the direction d of the edge: report eq. 5.23
+        without its arccos, which loses the sign and, for small angles, digits.
         """
         start, end = (points[corner] for corner in self.ends.T)
         along = end - start

@@ -10,7 +10,7 @@ from fem_reference.geometry.distance import Distances, distances
 
 # A point that rounding leaves between two tets is searched again at this distance, as a share of the mesh's diagonal.
 _NUDGE = 1e-9
-# A closest point whose weight for a corner is below this counts as on the opposite edge, or at a corner.
+# A closest point with a barycentric coordinate below this counts as on the opposite edge, or at a corner.
 _TIE = 1e-9
 
 
@@ -43,7 +43,7 @@ class Locator:
         self._tree.init(mesh.points, mesh.tets)
 
     def embed(self, points: Floats) -> Embedding:
-        """The tets that contain ``points`` (n, 3) [mm]."""
+        """The embedding of ``points`` (n, 3) [mm]."""
         points = np.ascontiguousarray(points, np.float64)
         tets = self._containing(points)
         lost = np.flatnonzero(tets < 0)
@@ -71,7 +71,7 @@ class Locator:
 
 
 def embed(mesh: TetMesh, points: Floats) -> Embedding:
-    """The places of ``points`` (n, 3) [mm] in ``mesh``."""
+    """The embedding of ``points`` (n, 3) [mm] in ``mesh``."""
     return Locator(mesh).embed(points)
 
 

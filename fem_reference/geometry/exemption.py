@@ -20,9 +20,9 @@ _INWARD = 1e-3
 
 
 class Corners(NamedTuple):
-    """The distinct corners (k,) of the pieces of a surface: the matrix ``carried`` (k, n) from positions of the vertices to
-    positions of the corners, the distances ``away`` (k,) [mm] from the attached part, 0 on it, and the index ``by`` (k,) of that
-    attachment; the corners ``at`` (p, 3) of each piece, and the corner at each of the ``vertices`` (n,).
+    """The distinct corners (k,) of the pieces of a surface. The matrix ``carried`` (k, n) maps positions of vertices to positions
+    of corners; ``away`` (k,) [mm] is the distance from the attached part, 0 on it, and ``by`` (k,) the index of its attachment.
+    ``at`` (p, 3) are the corners of each piece, and ``vertices`` (n,) the corner at each vertex.
     """
 
     carried: csr_array
@@ -34,10 +34,10 @@ class Corners(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Exemption:
-    """The part of a ``surface`` that is exempt from contact: the attached ``part`` (r, 3, 3), as triangles, each with the
-    index ``by`` (r,) of its attachment, to bones of these ``names``; and the surface within ``reach`` [mm] of it on the same side.
+    """The part of a ``surface`` that is exempt from contact: the triangles of the attached ``part`` (r, 3, 3), and the surface
+    within ``reach`` [mm] of them on the same side. ``by`` (r,): the index of each triangle's attachment; ``names``: the bones.
 
-    The reach is the ``spacing`` of the contact points: the area around a point closer to the attached part would include attached
+    The reach is the ``spacing`` of the contact points: the area of a point closer to the attached part would include attached
     area. The reach depends on the size of the surface and not on its triangles.
     """
 
@@ -49,8 +49,8 @@ class Exemption:
 
     @classmethod
     def of(cls, surface: Surface, attached: Iterable[tuple[str, Floats]] = ()) -> "Exemption":
-        """The exemption of a surface. ``attached``: for each attachment the name of the bone and the shares (m, 3) of the corners
-        of the triangles, 1 or 0; the attached part is where these shares, linear in triangles, are at least a half.
+        """The exemption of a surface. ``attached``: for each attachment, the name of the bone and the shares (m, 3), 1 or 0, of the
+        corners of the triangles. The attached part is where these shares, linear in triangles, are at least 1/2.
         """
         names, shares = zip(*attached, strict=True) if (attached := tuple(attached)) else ((), ())
         quarters = Pieces.whole(np.arange(len(surface.triangles))).quartered()
@@ -78,7 +78,7 @@ class Exemption:
 
     @cached_property
     def corners(self) -> Corners:
-        """The corners of the pieces, each with the least distance from the attached part among its pieces."""
+        """The corners of the pieces, each with its least distance from the attached part over all pieces."""
         triangles, pieces, count = self.surface.triangles, self.pieces, len(self.surface.points)
         weights = pieces.corners.reshape(-1, 3)
         named = np.where(weights > 0, np.repeat(triangles[pieces.parents], 3, axis=0), count)
@@ -135,7 +135,7 @@ def _distinct(rows: Floats) -> tuple[Floats, Ints]:
 
 
 def free_skin(exempt: Exemption, mesh: TetMesh, apart: float) -> Skin:
-    """The material points with contact, outside the ``exempt`` part, on average at most ``apart`` [mm] apart; in a ``mesh``."""
+    """The material points in a ``mesh`` that can be in contact (not ``exempt``), on average at most ``apart`` [mm] apart."""
     surface = exempt.surface
     pieces = cut(surface, np.arange(len(surface.triangles)), apart)
     places, areas = points(pieces.of(surface.points[surface.triangles]), np.ones(pieces.corners.shape[:2]))

@@ -12,7 +12,7 @@ from fem_reference.geometry.distance import distances
 
 # A point closer to the surface than this share of its diagonal counts as on it.
 _ON = 1e-10
-# If the sine of the angle between a triangle's plane and the view from the point is below this, its solid angle counts as 0.
+# If the sine of the angle between a triangle's plane and the line of sight is below this, its solid angle counts as 0.
 _EDGE_ON = 1e-10
 
 
@@ -47,8 +47,8 @@ class Extension:
 
 
 class _Edges:
-    """The e edges of m ``triangles`` (m, 3): their ``ends`` (2, e); and for each corner of the triangles the edge ``opposite`` to
-    it (3, m), with the direction ``sense`` (3, m), 1 or -1, in which the triangle runs along it.
+    """The e edges of m ``triangles`` (m, 3), with their ``ends`` (2, e). For each corner of a triangle, ``opposite`` (3, m) is the
+    opposite edge, and ``sense`` (3, m), 1 or -1, the direction in which the triangle runs along this edge.
     """
 
     def __init__(self, triangles: Ints) -> None:
@@ -62,9 +62,9 @@ class _Edges:
 def _mean_value_weights(point: Floats, rest: Floats, edges: _Edges) -> Floats:
     """The weights (n,) of the ``rest`` (n, 3) corners for a point off the surface.
 
-    The unit vectors u_i to the corners of a triangle span a spherical triangle. With c_i the vector product of the other two unit
-    vectors, s_i its length and theta_i the angle between them, its mean vector is m = 1/2 sum theta_i c_i / s_i, and corner i at
-    the distance d_i gets the weight c_i . m / (d_i c_i . u_i), where c_i . u_i is the same for all three.
+    The unit vectors u_i to the corners of a triangle span a spherical triangle. Let c_i be the vector product of the other two unit
+    vectors, s_i its length and theta_i the angle between them. The mean vector is then m = 1/2 sum theta_i c_i / s_i. Corner i at
+    the distance d_i has the weight c_i . m / (d_i c_i . u_i), where c_i . u_i is the same for all three corners.
     """
     rays = rest - point
     lengths = np.sqrt(np.einsum("nk,nk->n", rays, rays))

@@ -18,15 +18,15 @@ from fem_reference.geometry.fibres import POINTS, FibreField, resample
 from fem_reference.geometry.radial_basis import halton
 
 PLACE = "fibres.kohout_kukacka"
-_WINDOW = 7  # points of a line through which smoothing fits a parabola
+_WINDOW = 7  # the number of points of a line through which smoothing fits a parabola
 _FLAT = 1e-9  # twice the area of a triangle in the unit square below which its corners count as collinear
-_SHORTEST = 0.1  # least length of a pennate fibre, as a share of the extent of the longest fibre along the muscle
+_SHORTEST = 0.1  # the least length of a pennate fibre, as a share of the extent of the longest fibre along the muscle
 
 
 @dataclass(frozen=True, eq=False)
 class Contours:
-    """``sections`` of a muscle from one attachment to the other, the positions of their points in the unit ``squares``, and their
-    ``heights`` (k,) between 0 and 1 along the line through their centres, whose length is ``length`` [mm].
+    """Sections of a muscle from one attachment to the other. ``squares``: the positions of their points in the unit square;
+    ``heights`` (k,): their positions, between 0 and 1, along the line of a ``length`` [mm] through their centres.
     """
 
     sections: tuple[CrossSection, ...]
@@ -64,14 +64,14 @@ class Contours:
 def contours(field: FibreField, count: int, towards: Floats | None = None) -> Contours:
     """``count`` sections between the attachments, with about equal volumes between them; a section with holes is left out.
 
-    The first side of the middle section's square is along ``towards`` (3,) or, if None, along its longest axis; the squares of the
-    other sections follow from section to section by the nearest points of their rims.
+    The first side of the middle section's square is along ``towards`` (3,) or, if this is None, along the longest axis. The squares
+    of the other sections follow from section to section by the nearest points of their rims.
     """
     means = field.values[field.mesh.tets].mean(axis=1)
     levels = np.quantile(means, (np.arange(count) + 0.5) / count)
     sections = tuple(one for level in levels if (one := cross_section(field.mesh, field.values, level)) is not None)
     if len(sections) < 2:
-        raise InputError(f"{PLACE}.contours", f"{len(sections)} sections in one piece without holes", "two at least")
+        raise InputError(f"{PLACE}.contours", f"{len(sections)} sections in one piece without holes", "at least two")
     moments = [one.moments for one in sections]
     ends = [field.mesh.points[facets].mean(axis=(0, 1)) for facets in (field.start, field.end)]
     centres = np.array([ends[0], *(centre for centre, _ in moments), ends[1]])
@@ -86,19 +86,19 @@ def contours(field: FibreField, count: int, towards: Floats | None = None) -> Co
 
 
 def _first(middle: CrossSection, product: Floats, towards: Floats | None) -> Floats:
-    """The unit vector (3,) in the ``middle`` section along ``towards``, or the longest axis, its largest component positive."""
+    """The unit vector (3,) in the ``middle`` section along ``towards``, or along the longest axis (largest component positive)."""
     if towards is None:
         longest = np.linalg.eigh(product)[1][:, 2]
         towards = longest * np.sign(longest[np.argmax(np.abs(longest))])
     flat = towards - (towards @ middle.normal) * middle.normal
     if np.linalg.norm(flat) < 1e-6 * np.linalg.norm(towards):
-        raise InputError(f"{PLACE}.towards", "a direction along the muscle", "one across it")
+        raise InputError(f"{PLACE}.towards", "a direction along the muscle", "a direction across the muscle")
     return np.asarray(flat / np.linalg.norm(flat))
 
 
 def template(count: int, slope: float) -> Floats:
-    """Control points (count, 2, 3) of Bezier curves in the unit cube, spread evenly (Halton): parallel to its third axis, or
-    inclined towards the first axis by the ``slope`` and cut off at the cube's sides.
+    """Control points (count, 2, 3) of Bezier curves in the unit cube, spread evenly (Halton). The curves are parallel to the third
+    axis, or inclined towards the first axis by the ``slope`` and cut off at the cube's sides.
     """
     across = halton(count, 2)
     margin = _SHORTEST * min(slope, 1.0)
@@ -134,8 +134,8 @@ def _samples(ends: Floats, heights: Floats) -> Floats:
 
 
 def _smooth(line: Floats) -> Floats:
-    """The line (40, 3) with each point on the parabola nearest to it and six neighbours; the ends stay."""
-    from scipy.signal import savgol_filter  # the import takes half a second, with scipy.stats
+    """The line (40, 3) with each point on the parabola that best fits it and its six neighbours; the ends stay."""
+    from scipy.signal import savgol_filter  # imported here, as it loads scipy.stats, which takes half a second
 
     found = savgol_filter(line, _WINDOW, 2, axis=0, mode="interp")
     found[[0, -1]] = line[[0, -1]]

@@ -15,9 +15,9 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.nested import EDGES
 
-POINTS = 40  # of each line
+POINTS = 40  # on each line
 _NEAR = 1e-3  # a line has arrived where the field is this close to 0 or 1
-# Seeds whose relative difference is below this are ordered by their index, so that a rotated mesh gives the same lines.
+# Seeds whose scores differ by less than this share are ordered by their index, so that a rotated mesh gives the same lines.
 _TIES = 1e-6
 _HALFWAY = 0.5 - _TIES  # a field value of 1/2 up to rounding counts as above it
 
@@ -27,8 +27,8 @@ Directions = Callable[[Ints, Floats], Floats]
 
 @dataclass(frozen=True, eq=False)
 class FibreField:
-    """A Laplace field between two attachments: ``values`` (n,) and ``gradients`` (n, 3) at the points of its own ``mesh``, 0 on
-    the triangles ``start`` (m, 3), 1 on ``end``.
+    """A Laplace field between two attachments: ``values`` (n,) and ``gradients`` (n, 3) at the points of its own ``mesh``; the
+    value is 0 on the triangles ``start`` (m, 3) and 1 on ``end``.
     """
 
     mesh: TetMesh
@@ -44,7 +44,7 @@ class FibreField:
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
         """Unit vectors (n, 3) along the fibres at rest ``points`` (n, 3), independent of their ``cells``."""
         found = self.directions(points)
-        flat = np.linalg.norm(found, axis=1) < 0.5  # no slope: all points around belong to one attachment
+        flat = np.linalg.norm(found, axis=1) < 0.5  # zero gradient: all points around belong to one attachment
         if flat.any():
             mean = self.gradients.mean(axis=0)
             found[flat] = mean / np.linalg.norm(mean)
@@ -74,8 +74,8 @@ class FibreField:
 
 
 def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
-    """A Laplace field in the tetrahedra of a muscle, by linear elements: 0 on the facets ``start`` of the ``mesh``, 1 on ``end``,
-    without flux elsewhere; 1/2 where the two touch, which is possible on a coarse mesh.
+    """The Laplace field in the tetrahedra of a muscle, by linear elements. It is 0 on the facets ``start`` of the ``mesh`` and 1 on
+    ``end``. It is 1/2 where the two touch, as they may on a coarse mesh. The flux through the rest of the boundary is 0.
     """
     zeros, ones = np.unique(mesh.facets[start]), np.unique(mesh.facets[end])
     values = np.zeros(len(mesh.points))
@@ -89,7 +89,7 @@ def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
 def trace(field: FibreField, count: int) -> Polylines:
     """``count`` lines of 40 points each along ``field``, from one attachment to the other.
 
-    They are spread over the section halfway; InputError if fewer can be traced.
+    The lines are spread over the section halfway; InputError if fewer can be traced.
     """
     seeds = _seeds(field)
     if len(seeds) == 0:
@@ -100,7 +100,7 @@ def trace(field: FibreField, count: int) -> Polylines:
     ahead, came_ahead = _follow(field, seeds, field.end, 1.0)
     whole = np.flatnonzero(came_back & came_ahead)[:count]
     if len(whole) < count:
-        raise InputError("fibres.traced.count", count, f"at most {len(whole)}, the fibres that could be traced")
+        raise InputError("fibres.traced.count", count, f"at most {len(whole)}, the number that could be traced")
     lines = [resample(np.concatenate([back[i][::-1], ahead[i][1:]])) for i in whole]
     return Polylines(np.concatenate(lines), np.arange(count + 1) * POINTS)
 
@@ -177,7 +177,7 @@ def _seeds(field: FibreField) -> Floats:
 
 
 def spread(points: Floats, count: int) -> Floats:
-    """At most ``count`` of ``points`` (k, d), first the most central, then always the farthest from the chosen points."""
+    """At most ``count`` of ``points`` (k, d), first the most central, then each farthest from all chosen before."""
     chosen = [_first_best(-np.linalg.norm(points - points.mean(axis=0), axis=1))]
     distances = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):

@@ -1,6 +1,6 @@
 """Meshes of scalar fields: intervals and triangles, in the plane or in space; their sizes, boundary and refinement.
 
-Vocabulary of shapes: points ``(n, d)`` with d from 1 to 3, cells ``(m, 2)`` of an interval (d = 1) or ``(m, 3)`` of triangles.
+Array shapes: points ``(n, d)`` with d from 1 to 3, cells ``(m, 2)`` of an interval (d = 1) or ``(m, 3)`` of triangles.
 """
 
 from collections.abc import Callable
@@ -58,7 +58,7 @@ class FieldMesh:
         return np.asarray(np.sqrt(np.maximum(np.linalg.det(gram), 0)) / (self.cells.shape[1] - 1))
 
 
-POINTS = 5  # of the quadrature rules along each direction: exact up to degree 9
+POINTS = 5  # the number of quadrature points along each direction: exact up to degree 9
 # The largest allowed coordinate, so that areas and results computed from it are finite.
 FURTHEST = 1e50
 
@@ -69,16 +69,16 @@ def check(mesh: FieldMesh) -> FieldMesh:
     if not np.isfinite(mesh.points).all():
         raise InputError(mesh.place, "a coordinate that is not a finite number", "finite coordinates")
     if np.abs(mesh.points).max(initial=0.0) > FURTHEST:
-        raise InputError(mesh.place, f"a coordinate beyond {FURTHEST:g}", "coordinates with finite squares")
+        raise InputError(mesh.place, f"a coordinate beyond {FURTHEST:g}", "coordinates whose squares are finite")
     if mesh.cells.size == 0 or mesh.cells.min() < 0 or mesh.cells.max() >= count:
-        raise InputError(mesh.place, f"a cell with a vertex outside of 1 to {count}", "numbers of its points")
+        raise InputError(mesh.place, f"a cell with a vertex outside 1 to {count}", "vertex numbers of the mesh")
     lonely = np.flatnonzero(np.bincount(mesh.cells.ravel(), minlength=count) == 0)
     if len(lonely):
-        raise InputError(mesh.place, f"vertex {lonely[0] + 1} in no cell", "every vertex in a cell")
+        raise InputError(mesh.place, f"vertex {lonely[0] + 1} in no cell", "each vertex in a cell")
     extent = float(np.ptp(mesh.points, axis=0).max())
     flat = np.flatnonzero(mesh.sizes <= 1e-14 * extent ** (mesh.cells.shape[1] - 1))
     if len(flat):
-        raise InputError(mesh.place, f"cell {flat[0] + 1} without extent", "cells with a length or an area")
+        raise InputError(mesh.place, f"cell {flat[0] + 1} of size zero", "cells with a length or an area")
     if mesh.cells.shape[1] == 3:
         edges, sides = np.unique(_all_edges(mesh.cells), axis=0, return_counts=True)
         if sides.max() > 2:
@@ -107,12 +107,11 @@ def share_above(mesh: FieldMesh, level: float) -> Floats:
 
 
 def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: int) -> tuple[float, Floats]:
-    """The greatest Peclet number of all cells and, of each (m,), the parameter ``tau = h / 2|v| (coth Pe - 1 / Pe)`` of upwinding.
+    """The greatest Peclet number of all cells, and for each (m,) the upwinding parameter ``tau = h / 2|v| (coth Pe - 1 / Pe)``.
 
-    ``Pe = |v| h / 2k``, with ``diffusion`` k, v the part of the ``velocity`` (d,) along the cell and h the distance of nodes along
-    v, ``2|v| / sum |v . grad lambda|`` over the ``order`` of the elements (Brooks and Hughes 1982, doi
-    10.1016/0045-7825(82)90071-8; h after Tezduyar 1986). On an interval it makes linear elements exact at their nodes for constant
-    coefficients.
+    ``Pe = |v| h / 2k``, with the ``diffusion`` k and the part v of the ``velocity`` (d,) along the cell (Brooks and Hughes 1982,
+    doi 10.1016/0045-7825(82)90071-8). The distance h of nodes along v is ``2|v| / sum |v . grad lambda|`` divided by the ``order``
+    of the elements (Tezduyar 1986). On an interval, tau makes linear elements exact at their nodes for constant coefficients.
     """
     slopes = barycentric_gradients(mesh)
     rates = np.abs(slopes @ velocity).sum(axis=1) * order / 2  # |v| / h
@@ -126,7 +125,7 @@ def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: in
 
 
 def refined(mesh: FieldMesh) -> FieldMesh:
-    """Intervals cut in two, triangles in four at edge midpoints; vertex i stays vertex i, the middle of edge j is vertex n + j."""
+    """Intervals cut in two, or triangles in four, at edge midpoints; vertex i keeps its index, and edge j gives vertex n + j."""
     cells: list[tuple[Ints, ...]]
     if mesh.cells.shape[1] == 2:
         a, b, ab = nodes(mesh, 2).T
@@ -144,9 +143,9 @@ def _all_edges(cells: Ints) -> Ints:
 
 
 def l2_distance(mesh: FieldMesh, values: Floats, exact: Callable[[Floats], Floats]) -> float:
-    """The L2 norm over a ``mesh`` of intervals or triangles, in the plane or in space, of a Lagrange function minus an ``exact``
-    function, which gives values (q,) at points (q, d). The Lagrange function has ``values`` (N,) at the nodes: the vertices, and
-    for order 2 then the midpoints of ``mesh.edges``.
+    """The L2 norm, over a ``mesh`` in the plane or in space, of a Lagrange function minus an ``exact`` function, which gives values
+    (q,) at points (q, d). The Lagrange function has ``values`` (N,) at the nodes: the vertices, followed for order 2 by the
+    midpoints of ``mesh.edges``.
     """
     order = 1 if len(values) == len(mesh.points) else 2
     barycentric, weights = rule(mesh.cells.shape[1])
@@ -159,8 +158,8 @@ def l2_distance(mesh: FieldMesh, values: Floats, exact: Callable[[Floats], Float
 @cache
 def rule(corners: int) -> tuple[Floats, Floats]:
     """Barycentric coordinates (q, k) of the points of a quadrature rule for cells with k ``corners``, 2 or 3, and its weights (q,),
-    whose sum is 1: Gauss-Legendre, in a triangle times Gauss-Jacobi along lines through a corner (Stroud 1971, Approximate
-    Calculation of Multiple Integrals, 2.4).
+    whose sum is 1. The rule is Gauss-Legendre; in a triangle, its product with Gauss-Jacobi along lines through a corner (Stroud
+    1971, Approximate Calculation of Multiple Integrals, 2.4).
     """
     x, w = scipy.special.roots_legendre(POINTS)
     along, weights = (1 + x) / 2, w / 2
@@ -173,7 +172,7 @@ def rule(corners: int) -> tuple[Floats, Floats]:
 
 
 def nodes(mesh: FieldMesh, order: int) -> Ints:
-    """The nodes (m, k) of each cell: its corners, and for order 2 then the midpoints of its edges, from each corner to the next."""
+    """The nodes (m, k) of each cell: its corners, then for order 2 the midpoints of its edges, from each corner to the next."""
     if order == 1:
         return mesh.cells
     middles = mesh.edge_numbers(_all_edges(mesh.cells)).reshape(len(mesh.cells), -1)
@@ -183,7 +182,7 @@ def nodes(mesh: FieldMesh, order: int) -> Ints:
 def functions(barycentric: Floats, order: int) -> Floats:
     """The Lagrange functions (q, k) at ``barycentric`` coordinates (q, 2 or 3), in the order of :func:`nodes`.
 
-    Order 2: ``L_i (2 L_i - 1)`` at corners, ``4 L_i L_j`` between two (Zienkiewicz and Taylor, The Finite Element Method, 8.8).
+    Order 2: ``L_i (2 L_i - 1)`` at corners and ``4 L_i L_j`` at midpoints (Zienkiewicz and Taylor, The Finite Element Method, 8.8).
     """
     if order == 1:
         return barycentric

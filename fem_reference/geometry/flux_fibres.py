@@ -1,8 +1,8 @@
-"""Fibres by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves evenly over another.
+"""Fibres by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves evenly over the other.
 
 The flux per area of an attachment is constant, so lines that start evenly over one attachment end evenly over the other, and cover
-both. In contrast, the gradient of a potential that is constant on attachments is concentrated at their rims: in a sheet with a
-fully attached face, nearly all lines start at the edge next to the other attachment.
+both. In contrast, the gradient of a potential that is constant on attachments is concentrated at their rims. In a sheet with a
+fully attached face, nearly all its lines start at the edge next to the other attachment.
 """
 
 from dataclasses import dataclass
@@ -25,17 +25,17 @@ from fem_reference.foundations.mesh import (
 )
 from fem_reference.geometry.fibres import POINTS, FibreField, averaged, resample, spread
 
-MOST = 1000  # fibres
-_LINES, _LINES_EACH = 1000, 8  # least number of lines in all, and per fibre; the fibres are chosen among these lines
-_ROUNDS = 50  # the most iterations of Lloyd's algorithm, which converges in fewer
+MOST = 1000  # the greatest number of fibres
+_LINES, _LINES_EACH = 1000, 8  # the least number of lines in all, and per fibre; fibres are chosen among these lines
+_ROUNDS = 50  # the largest number of iterations of Lloyd's algorithm, which converges in fewer
 _PLASTIC = 1.324717957244746  # x^3 = x + 1: its powers spread points evenly (Roberts 2018, the R2 sequence)
 
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """A divergence-free flow through the tetrahedra of a ``mesh``: constant in each, ``slopes`` (k, 3) [1/mm2], with a total flux
-    of 1 from the facets ``start`` (m, 3) to ``end``. ``faces`` (k, 4): the indices of the triangles opposite the corners of each
-    tetrahedron; ``rises`` (k, 4, 3) [1/mm]: the gradients of its barycentric coordinates.
+    """A divergence-free flow through the tetrahedra of a ``mesh`` with a total flux of 1 from the facets ``start`` (m, 3) to
+    ``end``. Each tetrahedron has the constant flow ``slopes`` (k, 3) [1/mm2], the indices ``faces`` (k, 4) of the triangles
+    opposite its corners, and the gradients ``rises`` (k, 4, 3) [1/mm] of its barycentric coordinates.
     """
 
     mesh: TetMesh
@@ -53,11 +53,11 @@ class Flow:
 
 
 def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
-    """The flow from the facets ``start`` of a ``mesh`` to ``end``, even over the area of each, and none through the rest of the
-    boundary: the gradient of a potential with ``-laplace u = 0`` and ``du/dn = -1/A_start``, ``1/A_end`` or 0.
+    """The flow from the facets ``start`` of a ``mesh`` to ``end``, uniform over the area of each and 0 through the rest of the
+    boundary. It is the gradient of a potential with ``-laplace u = 0`` and ``du/dn = -1/A_start``, ``1/A_end`` or 0.
 
-    The elements are Crouzeix and Raviart's; their gradients are lowest-order Raviart-Thomas fields: the flux out of a tetrahedron
-    is exactly the flux into the next (Marini 1985, SIAM J. Numer. Anal. 22:493).
+    The elements are of the Crouzeix-Raviart type. Their gradients are lowest-order Raviart-Thomas fields, so the flux out of a
+    tetrahedron is exactly the flux into the next (Marini 1985, SIAM J. Numer. Anal. 22:493).
     """
     triangles = _triangles(mesh)
     _, first, numbers = np.unique(triangles, axis=0, return_index=True, return_inverse=True)
@@ -91,7 +91,7 @@ def streamlines(flux: Flow, count: int) -> Polylines:
     ends = np.array([[line[0] / sizes[0], line[-1] / sizes[1]] for line in lines]).reshape(-1, 6)
     kept = _middles(ends, count) if len(lines) >= count else np.arange(len(lines))
     if len(kept) < count:
-        raise InputError("fibres.traced.count", count, f"at most {len(kept)}, the fibres that could be traced")
+        raise InputError("fibres.traced.count", count, f"at most {len(kept)}, the number that could be traced")
     return Polylines(np.concatenate([resample(lines[i]) for i in kept]), np.arange(count + 1) * POINTS)
 
 
@@ -113,7 +113,7 @@ def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:
     facet = np.searchsorted(shares / shares[-1], (np.arange(count) + 1 / _PLASTIC) / count)  # never on a facet's rim
     square = (0.5 + np.arange(1, count + 1)[:, None] / _PLASTIC ** np.array([1, 2])) % 1
     beyond = square.sum(axis=1) > 1
-    square[beyond] = 1 - square[beyond]  # half of the square is the triangle; the other half is mirrored
+    square[beyond] = 1 - square[beyond]  # points in the other half of the square are mirrored into the triangle
     weights = np.column_stack([1 - square.sum(axis=1), square])
     triangles = _triangles(mesh)
     on = {tuple(corners): number // 4 for number, corners in enumerate(triangles.tolist())}

@@ -19,7 +19,7 @@ _BESIDE = 0.05
 _ROUNDS, _STEPS = 6, 8
 # The least and the greatest radius, relative to the edge of a cube of the same volume.
 _RADII = (0.02, 2.0)
-# The most steps of Newton's method, and its tolerance: the longest step over the least radius.
+# The largest number of Newton steps, and the tolerance: the longest step divided by the least radius.
 _PROJECTIONS, _THERE = 12, 1e-9
 
 
@@ -41,7 +41,7 @@ class GaussianSurface:
         return level, weights @ self.centres - points * weights.sum(axis=1)[:, None], shares
 
     def project(self, points: Floats, levels: Floats | float = 0.0) -> Floats:
-        """``points`` (n, 3) moved along the gradient to ``levels`` (n,) by Newton's method, steps below the least radius."""
+        """``points`` (n, 3) moved along the gradient to ``levels`` (n,) by Newton steps shorter than the least radius."""
         longest = float(self.radii.min())
         for _ in range(_PROJECTIONS):
             level, gradient, _ = self.level(points)
@@ -56,8 +56,8 @@ class GaussianSurface:
 
 def fit(surface: Surface, count: int) -> GaussianSurface:
     """The surface of ``count`` Gaussians nearest to a closed ``surface``: nonlinear least squares of distances at vertices and at
-    points on both sides of them, robust against outliers. Deterministic; the fit of a rotated or scaled surface is the rotated or
-    scaled fit, up to rounding, if its principal axes are distinct.
+    points on both sides of them, robust against outliers. The fit is deterministic. A rotated or scaled surface gives the
+    rotated or scaled fit, up to rounding, if its principal axes are distinct.
     """
     if count < 2:
         raise InputError("gaussians", count, "two or more")
@@ -109,7 +109,7 @@ def _slopes(surface: GaussianSurface, points: Floats) -> Floats:
 
 
 def _samples(surface: Surface) -> tuple[Floats, Floats]:
-    """Points (k, 3): vertices, and points on both sides of them; and their distances (k,) from the surface."""
+    """Points (k, 3): vertices, and points on both sides of the vertices; and their distances (k,) from the surface."""
     some = farthest_points(surface.points, _SAMPLES)
     points, normals = surface.points[some], igl.per_vertex_normals(surface.points, surface.triangles)[some]
     sides = np.array([0.0, _BESIDE, -_BESIDE])

@@ -11,8 +11,8 @@ _GRID = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 
 
 
 def penetration(one: Surface, other: Surface) -> tuple[float, Floats]:
-    """The depth [mm] to which two closed surfaces penetrate each other, and its place (3,): that of the deepest vertex of either in
-    the other, or of the deepest of the 28 sample points on each triangle that crosses the other; 0 where they are apart.
+    """The depth [mm] to which two closed surfaces penetrate each other, 0 if they are apart, and its place (3,). It is the greatest
+    over all vertices, and over 28 sample points on each triangle that crosses the other surface.
     """
     pairs = crossings(one, other)
     depths, places = [np.zeros(1)], [one.points[:1]]

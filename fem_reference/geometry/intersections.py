@@ -51,13 +51,13 @@ def crossings(one: Surface, other: Surface) -> Ints:
 
 def overlaps(one: Floats, other: Floats) -> Floats:
     """Penetration (k,) [mm] of triangles ``one`` and ``other`` (k, 3, 3) that cross: the shortest displacement along the normal of
-    one that moves the other off its plane; 0 if either has no area.
+    either that moves the other to one side of its plane; 0 if either has no area.
     """
     return np.asarray(np.nan_to_num([_reach(one, other), _reach(other, one)]).min(axis=0))
 
 
 def _reach(triangles: Floats, walls: Floats) -> Floats:
-    """Depth (k,) of ``triangles`` beyond the planes of ``walls``, on the side where it is less; NaN if a wall has no area."""
+    """Depth (k,) of ``triangles`` beyond the planes of ``walls``, on the side where it is smaller; NaN if a wall has no area."""
     with np.errstate(invalid="ignore", divide="ignore"):
         across = (found := normals(walls)) / np.linalg.norm(found, axis=1)[:, None]
     heights = np.einsum("kci,ki->kc", triangles - walls[:, :1], across)

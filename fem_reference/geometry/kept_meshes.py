@@ -1,4 +1,4 @@
-"""A cache on disk for tetrahedra and other arrays that take long to make: written atomically, made anew if damaged."""
+"""A cache on disk for tetrahedra and other arrays that take long to make: written atomically, and made again if damaged."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -69,7 +69,7 @@ def _read[T](path: Path, of_arrays: Callable[[Arrays], T]) -> T | None:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             return of_arrays(dict(arrays))
     except Exception as error:  # zipfile and numpy raise many types of errors on a damaged file
-        log.warning("%s: damaged, made anew: %s", path, error)
+        log.warning("%s: the stored arrays are damaged and are made again: %s", path, error)
         return None
 
 
@@ -80,4 +80,4 @@ def _write(path: Path, arrays: Arrays) -> None:
         with files.whole(path) as part:
             np.savez(part, allow_pickle=False, **arrays)
     except OSError as why:
-        log.warning("%s: not kept: %s", path, why)
+        log.warning("%s: the arrays were not stored: %s", path, why)

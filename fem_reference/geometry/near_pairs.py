@@ -20,7 +20,7 @@ class _Triangles(ctypes.Structure):
 
     @classmethod
     def of(cls, surface: Surface) -> "_Triangles":
-        """The triangles of a ``surface``, which must outlive them: no copy is made."""
+        """The triangles of a ``surface``, which must outlive this object: no copy is made."""
         return cls(len(surface.triangles), surface.points.ctypes.data, surface.triangles.ctypes.data)
 
 
@@ -30,21 +30,21 @@ class _Sorted:
     def __init__(self, surface: Surface, code: ctypes.CDLL) -> None:
         self.code, self.grid = code, code.sorted(_Triangles.of(surface))
         if not self.grid:
-            raise MemoryError("pairs of triangles")
+            raise MemoryError("not enough memory for pairs of triangles")
 
     def __del__(self) -> None:
         if self.grid:
             self.code.forget(self.grid)
 
 
-# Pairs with a bone are sought at many frames, each time in its own coordinates.
+# Pairs with a bone are searched at many frames, always in the coordinates of the bone, so its sorted triangles are kept.
 _kept = lru_cache(maxsize=8)(_Sorted)
 
 
 def near_pairs(one: Surface, other: Surface) -> Ints | None:
-    """Pairs (k, 2) of triangles of two surfaces that may intersect or touch, or of one with itself, each pair
-    once: all that do, and few others. Triangles of one surface that share an edge, or only touch at a common corner, are left
-    out. None without a compiler, or if a point is not finite. Faster if ``other`` is the surface of an earlier call.
+    """Pairs (k, 2) of triangles of two surfaces, or of one surface with itself, that may intersect or touch: every pair that does,
+    once, and few others. Triangles of one surface that share an edge, or only touch at a common corner, are left out. None without
+    a compiler, or if a point is not finite. The search is faster if ``other`` is the surface of an earlier call.
     """
     code = _code()
     if code is None or not all(np.isfinite(surface.points).all() for surface in (one, other)):

@@ -18,8 +18,8 @@ from fem_reference.geometry.coarsening import inflate
 from fem_reference.geometry.distance import distances
 
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
-# The eight parts of a tet with corners 0 to 3 and points 4 to 9 on its edges in the order above, for each of the three diagonals,
-# between points on opposite edges, along which the octahedron in the middle may be cut.
+# The eight parts of a tet with corners 0 to 3 and points 4 to 9 on its edges in the order above. There is one division for each of
+# the three diagonals, between points on opposite edges, along which the octahedron in the middle may be cut.
 _CORNERS = [[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]]
 _DIAGONALS = np.array([[4, 9], [5, 8], [6, 7]])
 PARTS = np.array(
@@ -43,9 +43,9 @@ _ROUNDS, _SHORTER = 12, 0.6
 def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) -> TetMesh:
     """The mesh with each tetrahedron cut into eight, and each facet of a region into four.
 
-    Edges that begin at the rims of the regions ``rims`` of ``mesh.facets`` are cut at a quarter, all others in the middle. All
-    boundary points then move onto ``surface``, and from there along their normals to keep the enclosed volume, as far as
-    tetrahedra stay valid; if ``surface`` is None they stay where they are.
+    Edges that begin at the rims of the regions ``rims`` of ``mesh.facets`` are cut at a quarter of their length, all others in the
+    middle. All boundary points then move onto ``surface``, and from there along their normals to keep the enclosed volume, as far
+    as tetrahedra stay valid. If ``surface`` is None, the points stay where they are.
     """
     ends, of_tets, middles = _cut(mesh, _on_rims(mesh, rims))
     points = np.concatenate([mesh.points, middles])
@@ -67,7 +67,7 @@ def _cut(mesh: TetMesh, on_rim: Bools) -> tuple[Ints, Ints, Floats]:
 
 
 def _on_rims(mesh: TetMesh, rims: tuple[str, ...]) -> Bools:
-    """Mask (n,) of the points on the rim of one of these regions: on an edge between a facet of the region and a facet outside."""
+    """Mask (n,) of the points on the rim of a region in ``rims``: on an edge between a facet of the region and one outside."""
     found = np.zeros(len(mesh.points), bool)
     for name in rims:
         faces = mesh.facets[name]

@@ -25,7 +25,7 @@ class Touch:
 
 @dataclass(frozen=True, eq=False)
 class Quadric:
-    """An ellipsoid of semi-axes ``radii`` (3,) [mm] along its own axes, placed by ``pose`` (4, 4).
+    """An ellipsoid with semi-axes ``radii`` (3,) [mm] along its own axes, placed by ``pose`` (4, 4).
 
     An infinite radius makes it a cylinder.
     """
@@ -44,12 +44,12 @@ class Quadric:
         return replace(self, pose=pose @ self.pose)
 
     def level(self, points: Floats) -> tuple[Floats, Floats]:
-        """Values (n,) of the sum of (x / a)^2, less 1, and gradients (n, 3)."""
+        """The level (n,), which is the sum of (x / a)^2 minus 1, and its gradients (n, 3)."""
         own = self._own(points) / self.radii
         return np.vecdot(own, own) - 1, 2 * (own / self.radii) @ self.pose[:3, :3].T
 
     def bending(self, _: Floats, directions: Floats) -> Floats:
-        """The second derivative (n,) along ``directions`` (n, 3), the same everywhere."""
+        """The second derivative (n,) of the level along ``directions`` (n, 3), the same everywhere."""
         own = directions @ self.pose[:3, :3] / self.radii
         return np.asarray(2 * np.vecdot(own, own))
 
@@ -60,12 +60,12 @@ class Quadric:
 
     @cached_property
     def _form(self) -> Floats:
-        """The matrix (3, 3) of half of the second derivatives."""
+        """The matrix (3, 3) of half the second derivatives of the level."""
         turn = self.pose[:3, :3] / self.radii
         return np.asarray(turn @ turn.T)
 
     def pushed(self, points: Floats) -> Floats:
-        """``points`` (n, 3), those inside moved to the surface along its normal, those deep inside first moved off the axis."""
+        """``points`` (n, 3), with points inside moved to the surface along its normal, and deep ones first moved off the axis."""
         own, thin = self._own(points), int(np.argmin(self.radii))
         own[np.sum((own / self.radii) ** 2, axis=1) < _MIDDLE**2, thin] = _MIDDLE * self.radii[thin]
         size = np.sqrt(np.sum((own / self.radii) ** 2, axis=1))
@@ -89,9 +89,9 @@ class Quadric:
 
 @dataclass(frozen=True, eq=False)
 class Ring:
-    """A torus about the third axis of ``pose`` (4, 4): a ``tube`` [mm] around a circle of ``radius`` [mm].
+    """A torus about the third axis of ``pose`` (4, 4): a tube of radius ``tube`` [mm] around a circle of ``radius`` [mm].
 
-    Paths go through its hole.
+    Paths pass through its hole.
     """
 
     pose: Floats
@@ -108,12 +108,12 @@ class Ring:
         return replace(self, pose=pose @ self.pose)
 
     def level(self, points: Floats) -> tuple[Floats, Floats]:
-        """Values (n,) of the squared distance from the circle, less the squared radius of the tube, and gradients (n, 3)."""
+        """The level (n,), the squared distance from the circle minus the squared radius of the tube, and its gradients (n, 3)."""
         across = points - self._nearest(points)
         return np.vecdot(across, across) - self.tube**2, 2 * across
 
     def bending(self, points: Floats, directions: Floats) -> Floats:
-        """The second derivative (n,) at ``points`` (n, 3) along ``directions`` (n, 3)."""
+        """The second derivative (n,) of the level at ``points`` (n, 3) along ``directions`` (n, 3)."""
         return self._bending(directions, *self._outward(points))
 
     def curving(self, points: Floats, directions: Floats) -> Floats:
@@ -137,7 +137,7 @@ class Ring:
         return np.asarray(middle + across * np.maximum(self.tube / size, 1.0))
 
     def through(self, starts: Floats, ends: Floats) -> Floats:
-        """Points (n, 3) in the hole, nearest to the crossings of straight paths with its plane; else the midpoints of paths."""
+        """Points (n, 3) in the hole, nearest to where straight paths cross its plane; the midpoints of all other paths."""
         axis, centre = self.pose[:3, 2], self.pose[:3, 3]
         low, high = (starts - centre) @ axis, (ends - centre) @ axis
         crosses = low * high < 0
@@ -148,7 +148,7 @@ class Ring:
         return np.where(crosses[:, None], inner, point)
 
     def _outward(self, points: Floats) -> tuple[Floats, Floats]:
-        """Unit vectors (n, 3) and distances (n,) from the axis; for a point on the axis along the first axis of the pose."""
+        """Unit vectors (n, 3) and distances (n,) from the axis; for a point on the axis, the first axis of the pose."""
         arm = points - self.pose[:3, 3]
         flat = arm - (arm @ self.pose[:3, 2])[:, None] * self.pose[:3, 2]
         away = np.sqrt(np.vecdot(flat, flat))

@@ -1,4 +1,4 @@
-"""Attached and free parts of a coarse surface: well-shaped triangles and rims, with the areas and the volume preserved."""
+"""Attached and free parts of a coarse surface, remeshed with well-shaped triangles and rims; areas and volume are preserved."""
 
 from dataclasses import dataclass, replace
 
@@ -11,8 +11,8 @@ from fem_reference.geometry.coarsening import flip_edges, free_part, inflate, sl
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.edges import Edges
 
-_ROUNDS = 4  # of collapses, flips and slides
-_SHORT = 0.4  # Edges at a rim shorter than this are collapsed; in sizes of a triangle.
+_ROUNDS = 4  # The number of rounds of collapses, flips and slides.
+_SHORT = 0.4  # Edges at a rim that are shorter than this share of a triangle's size are collapsed.
 _STRAIGHT = np.cos(np.radians(50))  # A rim that turns by more than this at a point has a corner there.
 _SAME_SIDE = 0.5  # The least cosine between the normals of a triangle before and after a collapse.
 _TINY = np.finfo(float).tiny
@@ -83,7 +83,7 @@ def _along_rims(parts: Parts) -> Floats:
 
 
 def collapsed(parts: Parts, short: float) -> Parts:
-    """The parts after the collapse of edges below ``short`` [mm] that end on a rim, where surface and rims keep their shape."""
+    """The parts after the collapse of edges below ``short`` [mm] that end on a rim, if surface and rims keep their shape."""
     ends = np.unique(np.sort(parts.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     lengths = np.linalg.norm(parts.points[ends[:, 0]] - parts.points[ends[:, 1]], axis=1)
     next_on_rim: list[list[int]] = [[] for _ in parts.points]
@@ -117,10 +117,10 @@ def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> b
 
 
 def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) -> bool:
-    """True if ``goes`` may move onto ``stays``: surface manifold, edges sharp, no triangle flipped or flatter than the flattest."""
+    """True if moving ``goes`` onto ``stays`` keeps the surface manifold, edges sharp, and triangles unflipped and not too flat."""
     points, triangles = parts.points, parts.triangles
     here, there = set(triangles[around[goes]].ravel().tolist()), set(triangles[around[stays]].ravel().tolist())
-    if len(here & there) != 4 or len(here | there) < 6:  # two ends and two common neighbours; more than a tetrahedron
+    if len(here & there) != 4 or len(here | there) < 6:  # the ends share two neighbours, on more than a tetrahedron
         return False
     old = triangles[around[goes]]
     shift = (points[stays] - points[goes])[None]
@@ -143,8 +143,8 @@ def _flatness(points: Floats, triangles: Ints) -> Floats:
 
 
 def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Floats:
-    """The points (n, 3) [mm] moved so that the parts have given ``areas`` [mm2], from label 1 on, and enclose a ``volume`` [mm3]:
-    before the move both are too small, like a polygon inscribed in a circle. In each round the whole rim of a part moves outwards
+    """The points (n, 3) [mm] moved so that the parts have given ``areas`` [mm2], from label 1 on, and enclose a ``volume`` [mm3].
+    Before the move both are too small, like a polygon inscribed in a circle. In each round the whole rim of a part moves outwards
     by the same distance, at most ``most`` [mm], and then all points move along their normals.
     """
     for _ in range(_ROUNDS):

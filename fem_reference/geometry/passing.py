@@ -14,11 +14,11 @@ _BERNSTEIN = np.linalg.inv(
 
 
 def passed(starts: Floats, ends: Floats, before: Floats, after: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) of points that move straight from ``starts`` to ``ends`` (n, 3) and pass through the triangle in the same row,
-    whose corners move straight from ``before`` to ``after`` (n, 3, 3), from its front to its back.
+    """Mask (n,) of points that pass through the triangle in the same row from its front to its back. The points move straight from
+    ``starts`` to ``ends`` (n, 3), and the corners of the triangles from ``before`` to ``after`` (n, 3, 3).
 
-    The volume of the tetrahedron between point and triangle is a cubic in the share of the path (Provot 1997, Collision and
-    self-collision handling in cloth model dedicated to design garments); where it is 0 the point is in the plane.
+    The volume of the tetrahedron between point and triangle is a cubic function of the share of the path (Provot 1997, Collision
+    and self-collision handling in cloth model dedicated to design garments); where it is 0, the point is in the plane.
     """
 
     def at(share: float, some: NDArray[np.int64] | slice) -> tuple[Floats, Floats]:
@@ -48,7 +48,7 @@ def _is_inside(point: Floats, triangle: Floats) -> bool:
 
 def seen_along(points: Floats, directions: Floats, triangles: Floats) -> Floats:
     """The distance (n,) [mm] from ``points`` (n, 3) along unit vectors ``directions`` (n, 3) to the first of the ``triangles``
-    (t, 3, 3) whose back is towards them, infinite if there is none (Moeller and Trumbore 1997).
+    (t, 3, 3) whose back faces the point, infinite if there is none (Moeller and Trumbore 1997).
     """
     first, one, other = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     out, found = np.cross(one, other), np.full(len(points), np.inf)

@@ -25,13 +25,13 @@ _MORE = 1 + 1e-9
 # Sample points of a triangle that crosses another surface: a grid that divides its edges into quarters, with its corners.
 _GRID = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
 _CORNERS = _GRID.argmax(axis=0)
-# The first cubes have edges of at most this length [mm], and at most the longest extent of the surface over this number.
+# The first cubes have edges of at most this length [mm], and at most the longest extent of the surface divided by this number.
 _FIRST_EDGE, _FIRST_CUBES = 10.0, 20
-# The volume is not computed in a box of more first cubes than this (a cubic metre or more).
+# The volume is not computed if the box around the surface has more first cubes than this (a cubic metre or more).
 _TOO_MANY = 1e6
 # The number of rounds of subdivision, the largest number of cubes after each, and of points drawn in them.
 _ROUNDS, _MOST = 3, 8000
-# A triangle is sampled in parts with edges down to an eighth of its own.
+# The most times that a triangle is cut into four for sampling: its parts then have edges an eighth as long.
 _PARTINGS = 3
 
 Distance = Callable[[Floats], Floats]
@@ -40,8 +40,8 @@ Distance = Callable[[Floats], Floats]
 @dataclass(frozen=True, eq=False)
 class Depths:
     """Penetration depths (k,) [mm] of some vertices and triangles of a body and then of a bone, and their ``places`` (k, 3) [mm];
-    ``at`` (k,) are their indices, in ascending order. All others are outside. Only triangles that cross the other surface are
-    sampled; the deepest sample counts.
+    ``at`` (k,) are their indices, in ascending order. All other vertices and triangles are outside. Only triangles that cross the
+    other surface are sampled, and the deepest sample of each counts.
     """
 
     at: Ints
@@ -49,7 +49,7 @@ class Depths:
     places: Floats
 
     def deepest(self, rest: "Depths | None" = None) -> tuple[float, Floats]:
-        """The greatest depth [mm] beyond that at ``rest``, and its place (3,) [mm]."""
+        """The greatest depth [mm] in excess of the depth at ``rest``, and its place (3,) [mm]."""
         beyond = self.values.copy()
         if rest is not None:
             _, here, there = np.intersect1d(self.at, rest.at, assume_unique=True, return_indices=True)
@@ -61,9 +61,9 @@ class Depths:
 def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depths:
     """Penetration of a ``body`` and a ``bone`` at a ``pose`` (4, 4); ``shape`` gives the distance to the bone.
 
-    Depth in the bone is as exact as its distance field, depth in the body exact.
+    The depth in the bone is as accurate as its distance field; the depth in the body is exact.
     """
-    # In the frame of the bone, whose boxes stay the same; beside a bone at rest those of the body do too.
+    # In the frame of the bone its bounding boxes stay the same; if the bone is at rest, the boxes of the body do too.
     still = np.array_equal(pose, np.eye(4))
     local = body if still else body.moved_to(apply(np.linalg.inv(pose), body.points))
     pairs = crossings(local, bone)
@@ -72,7 +72,7 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
     def into_bone(points: Floats) -> Floats:
         return np.maximum(-shape.distances(points), 0.0) if len(points) else np.zeros(0)
 
-    def into_body(points: Floats) -> Floats:  # where the body is, whose boxes serve all bones
+    def into_body(points: Floats) -> Floats:  # in the frame of the body, whose search tree serves all bones
         return depths_within(body, apply(pose, points), of_body)
 
     tips, bone_tips = (_tips(surface, crossing) for surface, crossing in ((local, of_body), (bone, of_bone)))
@@ -103,7 +103,7 @@ def depths_within(body: Surface, points: Floats, known: Ints) -> Floats:
 
 
 def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) of the ``points`` (n, 3) inside a closed ``body``, by winding number; few points need no tree of its triangles."""
+    """Mask (n,) of the ``points`` (n, 3) inside a closed ``body``, by winding number; for few points no search tree is built."""
     found, some = np.zeros(len(points), bool), _in_box(body, points)
     if len(some) > _FEW:
         found[some] = inside(body, points[some])
@@ -121,9 +121,9 @@ def _in_box(body: Surface, points: Floats) -> Ints:
 def _of_surface(
     surface: Surface, crossing: Ints, depth: Callable[[Floats], Floats], tips: Ints, within: NDArray[np.bool_]
 ) -> tuple[Ints, Floats, Floats]:
-    """Indices of vertices and then of triangles of a surface, with their ``depth`` and places: the deepest sample of each triangle
-    ``crossing`` another surface, and the vertices connected to inside corners of these or to the ``tips`` that are ``within``;
-    ``tips`` belong to parts without such triangles.
+    """Indices of vertices and then of triangles of a surface, with their ``depth`` and places. Each triangle ``crossing`` another
+    surface has its deepest sample. The vertices are those connected to inside corners of these triangles, or to the ``tips`` that
+    are ``within`` the other surface; ``tips`` belong to parts without such triangles.
     """
     points, corners = surface.points, surface.triangles[crossing]
     grid = np.einsum("gc,tci->tgi", _GRID, points[corners])
@@ -157,7 +157,7 @@ def _flood(deep: NDArray[np.bool_], triangles: Ints, crossing: Ints) -> None:
 
 
 def _tips(surface: Surface, crossing: Ints) -> Ints:
-    """A vertex of each part of a surface without triangles ``crossing`` another surface: the whole part is on its side."""
+    """A vertex of each part of a surface without triangles ``crossing`` another surface: the part is on one side."""
     firsts, parts = _parts_of(surface)
     return np.delete(firsts, parts[surface.triangles[crossing, 0]])
 
@@ -169,7 +169,7 @@ def _parts_of(surface: Surface) -> tuple[Ints, Ints]:
 
 @lru_cache(maxsize=8)
 def _parts(triangles: bytes) -> tuple[Ints, Ints]:
-    """The first vertex of each part of a surface of ``triangles``, 64 bit integers, and the index (n,) of the part of each."""
+    """The first vertex of each part of a surface of ``triangles``, 64-bit integers, and the index (n,) of the part of each."""
     corners = np.frombuffer(triangles, np.int64).reshape(-1, 3)
     parts = connected_parts(corners[:, :2].ravel(), corners[:, 1:].ravel(), int(corners.max()) + 1)
     return np.unique(parts, return_index=True)[1], parts
@@ -185,14 +185,14 @@ class Shared(NamedTuple):
 def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance, body: Floats) -> Shared:
     """The part of the inside of a closed ``surface`` of m triangles that is in a rigid body.
 
-    Space is cut into cubes, those that may contain a part of the overlap into smaller ones, in which 4000 to 8000 random points
-    are drawn, the same every time. The estimate is unbiased. Its standard deviation is at most half the volume of one
-    point, times the square root of the number of points in cubes on the border of the overlap.
+    Space is cut into cubes, and cubes that may contain a part of the overlap are cut into smaller cubes. In these, 4000 to 8000
+    random points are drawn, the same every time. The estimate is unbiased. Its standard deviation is at most half the volume of
+    one point, times the square root of the number of points in cubes on the border of the overlap.
 
-    A point counts where its nearest triangle is in the mask ``counts`` (m,). The rigid body is given by the ``distance`` (n,)
-    [mm] of points (n, 3) to it, negative inside, with that of the surface's points as ``gaps``, and by points ``body`` (k, 3)
-    [mm] on all its sides: if all are inside the surface, the whole body counts. The volume is 0 where no counted triangle
-    enters the body and the middle of the body is outside the surface. It is NaN where the surface has grown beyond a cubic metre.
+    A point counts if its nearest triangle is in the mask ``counts`` (m,). The rigid body is given by the ``distance`` (n,) [mm] of
+    points (n, 3) to it, negative inside; ``gaps`` are the distances of the surface's points. If all points ``body`` (k, 3) [mm],
+    on all sides of the rigid body, are inside the surface, the whole body counts. The volume is 0 if no counted triangle enters
+    the body and the middle of the body is outside the surface. It is NaN if the surface has grown beyond a cubic metre.
     """
     extent = np.ptp(surface.points, axis=0)
     within = _within(surface, body)
@@ -218,14 +218,14 @@ def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: 
 
 
 def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
-    """Mask (k,) of the points (k, 3) of a ``body`` that are inside; all False if their mean is outside the surface's box."""
+    """Mask (k,) of the points (k, 3) of a ``body`` inside the surface; all False if their mean is outside the surface's box."""
     middle, low, high = body.sum(axis=0) / max(1, len(body)), surface.points.min(axis=0), surface.points.max(axis=0)
     boxed = len(body) > 0 and bool(((middle > low) & (middle < high)).all())
     return inside(surface, body) if boxed else np.zeros(len(body), bool)
 
 
 def _touches(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance) -> bool:
-    """True if a counted triangle enters the body; tested at vertices, and near the body at those of smaller parts of triangles."""
+    """True if a counted triangle enters the body; tested at vertices and, near the body, at corners of parts of triangles."""
     triangles = surface.triangles[counts]
     corners, away = surface.points[triangles], gaps[triangles]
     for _ in range(_PARTINGS):

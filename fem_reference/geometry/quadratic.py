@@ -20,8 +20,8 @@ _FLAT = np.repeat([0, 1 / 3], 3)
 
 @dataclass(frozen=True, eq=False)
 class Displaced:
-    """A ``mesh``, straight at rest, whose nodes are displaced ``by`` (k, 10, 3) [mm] and have a ``velocity`` (k, 10, 3) [mm/s]:
-    corners of each tet, then the middles of its ``EDGES``; None if these are unknown. A
+    """A ``mesh``, straight at rest, whose nodes are displaced ``by`` (k, 10, 3) [mm] and have a ``velocity`` (k, 10, 3) [mm/s],
+    None if unknown. The nodes of a tet are its corners, then the midpoints of its ``EDGES``. This class is a
     :class:`fem_reference.foundations.loads.Shape`.
     """
 
@@ -48,7 +48,7 @@ class Displaced:
         return float(sizes.sum()), np.asarray(sizes @ means)
 
     def facing(self, on: str) -> tuple[Floats, Floats] | None:
-        """The vector area (3,) [mm2] of a region now, outward, and its moment (3,) [mm3] about the origin; None if unknown."""
+        """The present outward vector area (3,) [mm2] of a region, and its moment (3,) [mm3] about the origin; None if unknown."""
         if self.by is None:
             return None
         tets, local = self._facets(on)
@@ -69,7 +69,7 @@ class Displaced:
         return sizes @ np.einsum("q,kqi->ki", _BULK, self.velocity), sizes @ moments
 
     def _facets(self, on: str) -> tuple[Ints, Ints]:
-        """The tet (m,) of each facet of a region, and the facet's nodes (m, 6) in it: corners, outward, and middles."""
+        """The tet (m,) of each facet of a region, and the facet's nodes (m, 6) in this tet: outward corners, then midpoints."""
         size = len(self.mesh.points)
         found, wanted = (
             (ends[:, 0] * size + ends[:, 1]) * size + ends[:, 2]
@@ -83,7 +83,7 @@ class Displaced:
 def _rule(element: skfem.ElementTriP2 | skfem.ElementTetP2) -> tuple[Floats, Floats, Floats]:
     """Basis functions (q, n) and their gradients (d, q, n) at the points of a rule exact to degree 4, and its weights (q,)."""
     points, weights = get_quadrature(element, 4)
-    nodes = range(6) if element.dim == 2 else (0, 1, 2, 3, 4, 6, 5, 7, 8, 9)  # scikit-fem has edge 12 before edge 02
+    nodes = range(6) if element.dim == 2 else (0, 1, 2, 3, 4, 6, 5, 7, 8, 9)  # scikit-fem orders edge 12 before edge 02
     values, slopes = zip(*(element.lbasis(points, i) for i in nodes), strict=True)
     return np.stack(values, axis=-1), np.stack(slopes, axis=-1), weights
 

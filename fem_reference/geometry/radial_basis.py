@@ -32,10 +32,10 @@ class RadialSum:
 
 def radial_sum(points: Floats, values: Floats, centres: Floats, shape: float, *, terms: int = 0) -> RadialSum:
     """The least-squares fit with these ``centres`` (m, d) to ``values`` (n,) at ``points`` (n, d); with as many centres as points
-    it interpolates. ``terms`` of the polynomial: 0, 1 or d + 1; the weights are orthogonal to it (3.10).
+    the fit interpolates. The polynomial has 0, 1 or d + 1 ``terms``; the weights are orthogonal to it (3.10).
     """
     if len(centres) > len(points) or len(centres) <= terms:
-        raise InputError("centres", len(centres), f"more than {terms}, at most {len(points)}, the number of points")
+        raise InputError("centres", len(centres), f"more than {terms} and at most {len(points)}, the number of points")
     basis = np.hstack([_gaussians(points, centres, shape), _monomials(points, terms)])
     # The weights are orthogonal to the polynomials: they lie in the null space of the polynomials at the centres.
     flat = np.linalg.qr(_monomials(centres, terms), mode="complete").Q[:, terms:]
@@ -87,8 +87,8 @@ def greedy_centres(points: Floats, values: Floats, count: int, shape: float, *, 
 
 
 def feature_centres(points: Floats, values: Floats, count: int, *, neighbours: int = 6) -> Floats:
-    """``count`` of the ``points`` (n, d): local maxima and minima of ``values`` (n,) among their neighbours first, then where the
-    values bend most, as the report places them (3.5.1).
+    """``count`` of the ``points`` (n, d): local maxima and minima of ``values`` (n,) among their neighbours first, then points
+    where the values bend most, as in the report (3.5.1).
     """
     _, near = cKDTree(points).query(points, k=min(neighbours + 1, len(points)))
     around = values[near[:, 1:]]

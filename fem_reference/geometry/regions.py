@@ -1,4 +1,4 @@
-"""Regions of a body at rest: the share, from 0 to 1, that a point has in each, independent of any mesh of the body."""
+"""Regions of a body at rest: the share of each region at a point, from 0 to 1, independent of the mesh of the body."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from fem_reference.geometry.signed_distance import signed_distances
 # Functions of points (n, 3) [mm] at rest that give shares (n,), from 0 to 1, or depths (n,) [mm] below a border. Picklable.
 Region = Callable[[Floats], Floats]
 Depth = Callable[[Floats], Floats]
-# The ratio of the slopes of the share at the depth of the width and at the border.
+# The slope of the share at a depth of the width, divided by its slope at the border.
 _RISE = 1000.0
 # Points on the border of a cell are moved by this share of the way to its middle, so that they are in the regions of the cell.
 INWARDS = 1e-6
@@ -26,9 +26,9 @@ class Blended:
     """The region of depth above 0: its share is ``(1000^t - 1) / 999``, where t grows from 0 at the border to 1 at a depth of
     ``width`` [mm].
 
-    In a region a thousand times as stiff as the body, the stiffness then grows by the same factor in equal parts of the width, and
-    elements that resolve the width converge; with ``3 t^2 - 2 t^3`` most of the growth would be in a fiftieth of the width. So the
-    stiffer of two materials should be the region. In series, 0.14 of the width counts as soft.
+    In a region a thousand times as stiff as the body, the stiffness grows by the same factor in equal parts of the width, so
+    elements that resolve the width converge. With ``3 t^2 - 2 t^3`` most of the growth would be in a fiftieth of the width. The
+    stiffer material should therefore be the region. In tension across the border, 0.14 of the width acts as soft material.
     """
 
     depth: Depth
@@ -79,8 +79,8 @@ class Around:
 
 @dataclass(frozen=True, eq=False)
 class Between:
-    """The part of a body where a Laplace ``field`` between two attachments is between ``first`` and ``last``; 0 and 1 mean up
-    to an attachment. The depth is the difference of the field from these values divided by its mean slope.
+    """The part of a body where a Laplace ``field`` between two attachments is between ``first`` and ``last``; 0 and 1 are the
+    attachments. The depth is the difference of the field from these values divided by its mean slope.
     """
 
     field: FibreField

@@ -1,4 +1,4 @@
-"""Signed distance to bones of closed form, and the protocol of all obstacles.
+"""Signed distance to bones of simple shapes, in closed form, and the protocol of all obstacles.
 
 Each body uses its own rest frame. Distances are negative inside; gradients are unit vectors out of the body, along the normal at
 the nearest part of the surface; curvatures are the second derivatives. On ridges, where two parts are equally near, one of the two
@@ -31,14 +31,14 @@ class Obstacle(Protocol):
 
     @property
     def steepest(self) -> float:
-        """A bound of the length of the gradient."""
+        """An upper bound on the length of the gradient."""
 
     @property
     def half_thickness(self) -> float:
         """The greatest depth [mm] inside the body."""
 
     def clearance(self, within: float) -> Callable[[Floats], Floats]:
-        """A lower bound (n,) [mm] of the length of paths from points (n, 3) to a distance of at most ``within`` [mm]."""
+        """A lower bound (n,) [mm] on the length of paths from points (n, 3) to a distance of at most ``within`` [mm]."""
 
     def sample(self, points: Floats) -> Sampled:
         """Distance and its two derivatives at ``points`` (n, 3) [mm] of the body's rest frame; NaN for NaN."""
@@ -48,7 +48,7 @@ class Obstacle(Protocol):
 
 
 class Exact:
-    """Base of bodies of closed form: their distance is exact everywhere."""
+    """Base of bodies whose distance has a closed form, exact everywhere."""
 
     steepest: ClassVar[float] = 1.0
 
@@ -136,7 +136,7 @@ class Capsule(_Rod):
 
 @dataclass(frozen=True)
 class Box(Exact):
-    """A box about ``centre`` with edges along the axes, of outer ``size`` [mm], edges and corners of radius ``rounding`` [mm]."""
+    """A box about ``centre`` of outer ``size`` [mm] along the axes, with edges and corners rounded to radius ``rounding`` [mm]."""
 
     centre: Vector
     size: Vector
@@ -169,7 +169,7 @@ class Cylinder(_Rod):
 
     @property
     def half_thickness(self) -> float:
-        """The radius, or half the length [mm]."""
+        """The radius or half the length, whichever is less [mm]."""
         return float(min(self.radius, np.linalg.norm(np.subtract(self.end, self.start)) / 2))
 
     def sample(self, points: Floats) -> Sampled:
@@ -198,7 +198,7 @@ CLOSED_FORMS: dict[str, type[HalfSpace | Box | Sphere | Capsule | Cylinder]] = {
 
 
 def _orthant(beyond: Floats) -> Sampled:
-    """Distance to the orthant of d coordinates below zero, at ``beyond`` (n, d); derivatives (n, d) and (n, d, d)."""
+    """Distance of points ``beyond`` (n, d) to the orthant of negative coordinates; its derivatives (n, d) and (n, d, d)."""
     outside = beyond > 0
     length, away, squares = _length(np.where(outside, beyond, 0.0))
     nearest = np.arange(beyond.shape[1]) == beyond.argmax(axis=1)[:, None]

@@ -21,17 +21,17 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.parts import Parts, between, relaxed, widened
 from fem_reference.geometry.sectors import attached_area, sectors, shares_at
 
-# Chosen by trials on the report's muscles and our own hip. Smoothing length of the shares in triangle sizes; more rounds corners.
+# These numbers were chosen by trials on hip muscles. The smoothing length of the shares, in triangle sizes; more rounds corners.
 _SMOOTHED = 0.1
-# A vertex closer to a crossing than this share of the edge moves to it. Above 0.35 triangles degenerate, below 0.25 slivers remain.
+# A vertex closer to a crossing than this share of the edge moves to it. Above 0.35 triangles degenerate; below 0.25 slivers remain.
 _NEAR = 0.3
 # A fixed vertex closer to a crossing than this share of the edge counts as on the rim.
 _THERE = 0.2
 # An edge across a piece of an attachment, or across a gap in it, is cut if the piece or gap is wider than this share of the edge.
 _NARROW = 0.3
-_REFINED = 2  # rounds of search for narrow pieces and gaps
-_ISLAND = 0.1  # the least area of an island of an attachment that is kept, in squares of the size
-_WIDENED = 0.1  # the most that a rim moves outwards in each round, in sizes of a triangle
+_REFINED = 2  # number of rounds of the search for narrow pieces and gaps
+_ISLAND = 0.1  # the least area of an island of an attachment that is kept, in squares of the triangle size
+_WIDENED = 0.1  # the most that a rim moves outwards in each round, in triangle sizes
 _SAMPLES = 17  # number of samples of the shares along an edge
 _TRIALS = 10  # number of trials of the level, to match the area
 
@@ -42,7 +42,7 @@ def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size
     (k, 3) of the corners of its triangles.
 
     The shares are smoothed over a tenth of ``size``, which drops single vertices and pinholes; the rim is the level line that
-    encloses the original area. Vertices near it move onto it and edges across it are cut there (Labelle and Shewchuk 2007,
+    encloses the original area. Vertices near the rim move onto it, and edges across it are cut there (Labelle and Shewchuk 2007,
     doi 10.1145/1276377.1276448, for surfaces).
     """
     free = np.zeros(len(coarse.triangles), np.int64)
@@ -104,7 +104,7 @@ def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
 
 
 def _islands(fine: Surface, shares: Floats) -> Ints:
-    """The index (m, 3) of the connected island of shares above a half that contains each corner, -1 outside all islands."""
+    """The index (m, 3) of the connected island of shares above 1/2 that contains each corner, -1 outside all islands."""
     attached = np.zeros(len(fine.points), bool)
     attached[fine.triangles[shares > 1 / 2]] = True
     ends = fine.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)

@@ -10,7 +10,7 @@ _SHARP = np.cos(np.radians(45))
 
 
 def sectors(surface: Surface) -> Ints:
-    """The index (m, 3) of the sector of each corner of the triangles: a part around a vertex, from sharp edge to sharp edge."""
+    """The index (m, 3) of the sector of each corner of the triangles: the part around a vertex from one sharp edge to the next."""
     triangles = surface.triangles
     normals = unit_normals(surface.points[triangles])
     one, other = twins(triangles).T
@@ -21,8 +21,8 @@ def sectors(surface: Surface) -> Ints:
 def attached_shares(surface: Surface, vertices: Ints) -> Floats:
     """The attached share, 1 or 0, of each corner (m, 3) of the triangles of ``surface``, for attached ``vertices`` (k,).
 
-    A vertex on a sharp edge attaches only the sides of the edge on which a triangle at the vertex is completely attached, if any:
-    the end of a muscle, but not a strip of arbitrary width of the belly next to it.
+    A vertex on a sharp edge attaches only the sides of the edge on which a triangle at the vertex is completely attached, if any.
+    This attaches the end of a muscle, but not a strip of arbitrary width of the belly next to it.
     """
     attached = np.zeros(len(surface.points), bool)
     attached[vertices] = True

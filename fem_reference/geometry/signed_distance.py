@@ -40,7 +40,7 @@ _FIRST_CELLS = 24
 _FORGETTING = 4
 # Every fourth node along an axis is exact everywhere; the others only near the surface.
 _STRIDE = 4
-# The number of random points around the surface at which the error is sampled, and of points in one call of libigl.
+# The number of random points on and around the surface at which the error is sampled.
 _PROBES = 30_000
 _CHUNK = 1_000_000
 # The number of points sampled at a time.
@@ -59,7 +59,7 @@ class Grid:
     is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and ``FAR`` outside the grid.
     ``error`` [mm] is the largest difference found from the exact distance within one spacing of the surface, and
     ``mean_error`` [mm] the root mean square there. Farther away, the ridges between two close parts of the surface are rounded like
-    edges, by a third of a spacing. The gradient is the spline's: a unit vector up to a few percent, more on edges.
+    edges, by a third of a spacing. The gradient is that of the spline: its length is 1 within a few per cent, except on edges.
     """
 
     coefficients: Floats
@@ -74,18 +74,18 @@ class Grid:
 
     @cached_property
     def steepest(self) -> float:
-        """A bound of the length of the gradient: along each axis a spline is no steeper than the steps of its coefficients."""
+        """A bound on the length of the gradient: along each axis a spline is no steeper than the steps of its coefficients."""
         steps = [np.abs(np.diff(self.coefficients, axis=axis)).max() for axis in range(3)]
         return float(np.linalg.norm(steps)) / self.spacing
 
     @cached_property
     def half_thickness(self) -> float:
-        """A bound of the greatest depth [mm], from the least coefficient; infinite if the nodes are too far apart for a bound."""
+        """A bound on the greatest depth [mm], from the least coefficient; infinite if the nodes are too far apart for a bound."""
         deepest = float(-self.coefficients.min())
         return deepest if deepest > self.spacing else np.inf
 
     def clearance(self, within: float) -> Clearance:
-        """A lower bound of the length of paths from points to where the distance is at most ``within`` [mm]."""
+        """A lower bound on the length of paths from points to where the distance is at most ``within`` [mm]."""
         return of_spline(self.coefficients, np.asarray(self.origin), self.spacing, within)
 
     def sample(self, points: Floats) -> Sampled:
@@ -144,10 +144,10 @@ def _weights(within: Floats, orders: int) -> Floats:
 
 def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:
     """The signed distance to a closed ``surface``, sampled on a grid with nodes ``spacing`` [mm] apart, and valid within ``margin``
-    [mm] of it. Single triangles may have any orientation; InputError if the surface bounds no body, as in ``check_closed``.
+    [mm] of it. Individual triangles may have any orientation; InputError if the surface bounds no body, as in ``check_closed``.
 
-    ``rounding`` is the standard deviation s [mm] of a Gaussian filter of the distance, as contact does not slide smoothly along
-    flat triangles; a surface with a mean curvature of 1/r moves inward by s^2/r. This shift is part of the error.
+    ``rounding`` is the standard deviation s [mm] of a Gaussian filter of the distance, used because contact does not slide smoothly
+    along flat triangles. A surface with a mean curvature of 1/r moves inward by s^2/r; this shift is part of the error.
     """
     check_finite(surface)
     outward, _ = igl.bfs_orient(surface.triangles)
@@ -165,22 +165,22 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
     """The grid of :func:`build` whose spacing is halved until its ``mean_error`` is at most ``error`` [mm] or ``MOST_NODES`` is
     reached; the grid's ``mean_error`` states the reached error.
 
-    The largest error is not a suitable measure: on sharp edges and thin rims, which a grid rounds, it decreases only in proportion
-    to the spacing, and does not decrease in a slit narrower than a cell.
+    The largest error is not a suitable measure. On sharp edges and thin rims, which a grid rounds, it decreases only in proportion
+    to the spacing; in a slit narrower than a cell it does not decrease.
     """
     spacing = float(np.ptp(surface.points, axis=0).max()) / _FIRST_CELLS
     grid = build(surface, spacing, margin)
     while not grid.mean_error <= error:
         spacing /= 2
         if math.prod(_extent(surface, spacing, margin)[1]) > MOST_NODES:
-            logger.warning("%s: error of its distance %.3g mm, wanted %.3g mm", surface.place, grid.mean_error, error)
+            logger.warning("%s: distance error of %.3g mm instead of %.3g mm", surface.place, grid.mean_error, error)
             break
         grid = build(surface, spacing, margin)
     return grid
 
 
 def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
-    """The grid of :func:`build` at the spacing of :func:`resolve`, stored in ``folder`` under a hash of all that determines it."""
+    """The grid of :func:`build` at the spacing of :func:`resolve`, stored in ``folder`` under a hash of all its inputs."""
     code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
     name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
 

@@ -20,14 +20,14 @@ _QUARTERS = np.array(
     ]
 ) / 2  # fmt: skip
 _RULE = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
-# The least number of points along the diagonal of a surface: on muscles of the hip they are 3 mm apart.
+# The least number of points along the diagonal of a surface: on hip muscles the points are 3 mm apart.
 _ACROSS = 80
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Material points of a surface that the mesh follows only roughly: the straight ``cells`` (n,) that carry them, their rest
-    positions ``points`` (n, 3) [mm], possibly slightly outside their cell, and their rest ``areas`` (n,) [mm2].
+    """Material points of a surface that the mesh follows only roughly. They have straight ``cells`` (n,) that carry them, rest
+    positions ``points`` (n, 3) [mm], possibly slightly outside their cells, and rest ``areas`` (n,) [mm2].
     """
 
     cells: Ints
@@ -51,8 +51,8 @@ def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float)
 
 
 def points(corners: Floats, shares: Floats) -> tuple[Floats, Floats]:
-    """Three points (3 k, 3) [mm] in each triangle of ``corners`` (k, 3, 3), by a rule exact for quadratic functions without points
-    on sharp edges, as these would be in contact on two faces at once; and their areas (3 k,) [mm2], weighted by ``shares`` (k, 3).
+    """Three points (3 k, 3) [mm] in each triangle of ``corners`` (k, 3, 3) by a rule exact for quadratic functions, and their areas
+    (3 k,) [mm2], weighted by ``shares`` (k, 3). No point is on a sharp edge, where it would be in contact on two faces at once.
     """
     areas = np.repeat(corner_areas(corners) / 3, 3) * (shares @ _RULE.T).ravel()
     return np.einsum("qk,tki->tqi", _RULE, corners).reshape(-1, 3), areas
@@ -83,7 +83,7 @@ class Pieces:
         return Pieces(np.concatenate(parents), np.concatenate(corners))
 
     def of(self, values: Floats) -> Floats:
-        """Values (k, 3, d) at the corners of the pieces of a field linear in triangles, with ``values`` (m, 3, d) at theirs."""
+        """Values (k, 3, d) at the corners of the pieces, linear in the triangles with ``values`` (m, 3, d) at their corners."""
         return self.corners @ values[self.parents]
 
     def quartered(self) -> "Pieces":
@@ -91,7 +91,7 @@ class Pieces:
         return Pieces(np.tile(self.parents, 4), quartered(self.corners))
 
     def halved(self, lengths: Floats) -> "Pieces":
-        """The pieces, each cut in two at the middle of its longest edge; ``lengths`` (k, 3): of the edges that leave corners."""
+        """The pieces, each cut in two at the middle of its longest edge; ``lengths`` (k, 3): of the edge from each corner."""
         order = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
         a, b, c = np.swapaxes(np.take_along_axis(self.corners, order[:, :, None], axis=1), 0, 1)
         halves = [np.stack([a, (a + b) / 2, c], axis=1), np.stack([(a + b) / 2, b, c], axis=1)]
@@ -104,7 +104,7 @@ def quartered(corners: Floats) -> Floats:
 
 
 def edge_lengths(corners: Floats) -> Floats:
-    """Edge lengths (k, 3) [mm] of triangles with ``corners`` (k, 3, 3): of the edge that leaves each corner."""
+    """Edge lengths (k, 3) [mm] of triangles with ``corners`` (k, 3, 3), of the edge from each corner to the next."""
     return np.asarray(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2))
 
 

@@ -1,4 +1,4 @@
-"""Fibres inside a muscle by Catmull-Rom splines between fibres on its surface: CHMD of Kohout and Cholt (report 6.1.2)."""
+"""Fibres inside a muscle by Catmull-Rom splines between fibres on its surface: the CHMD of Kohout and Cholt (report 6.1.2)."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -15,7 +15,7 @@ _GOLDEN = np.pi * (3 - np.sqrt(5))  # the golden angle, from seed to seed of a s
 
 
 def between(heads: Sequence[Polylines], count: int) -> Polylines:
-    """``count`` lines of 40 points between the surface fibres of each of ``heads``, shared in proportion to their mean sections.
+    """``count`` lines of 40 points between the surface fibres of each of ``heads``, in proportion to their mean cross-sections.
 
     The surface fibres of a head, three or more in any order, must surround it. Each point of a line is on a spline through two
     opposite points of a closed spline around the head and the mean of its fibres.
@@ -44,7 +44,7 @@ def _around(lines: Floats) -> Floats:
 
 
 def _halfway(lines: Floats) -> Floats:
-    """The positions (m, 2) [mm] of ``lines`` (m, 40, 3) halfway, across their mean and from it; the farthest on the first axis."""
+    """The positions (m, 2) [mm] of ``lines`` (m, 40, 3) halfway, from their mean and across it; the farthest on the first axis."""
     mean = lines.mean(axis=0)
     normal = mean[POINTS // 2 + 1] - mean[POINTS // 2 - 1]
     normal /= np.linalg.norm(normal)
@@ -57,7 +57,7 @@ def _halfway(lines: Floats) -> Floats:
 
 def outermost(lines: Polylines, count: int) -> Polylines:
     """At most ``count`` of ``lines``, with 40 points each: the line that is outermost halfway in each of ``count`` sectors. Sectors
-    are equal after a stretch that makes the section as wide in all directions, so that a flat muscle has lines on all sides.
+    are equal after a stretch that makes the section equally wide in all directions, so that a flat muscle has lines on all sides.
     """
     found = _alike(lines, 0)
     arms = _halfway(found)
@@ -66,7 +66,7 @@ def outermost(lines: Polylines, count: int) -> Polylines:
         raise InputError("fibres.chmd.around", "lines on one surface", "a muscle with a thickness")
     round_ones = arms @ (axes / np.sqrt(scales)) @ axes.T
     angles = np.arctan2(round_ones[:, 1], round_ones[:, 0])
-    angles -= angles[np.argmax(arms[:, 0])]  # the farthest
+    angles -= angles[np.argmax(arms[:, 0])]  # relative to the farthest line
     sectors = np.rint(count * angles / (2 * np.pi)).astype(np.int64) % count
     order = np.lexsort((-np.linalg.norm(round_ones, axis=1), sectors))
     _, chosen = np.unique(sectors[order], return_index=True)
@@ -75,7 +75,7 @@ def outermost(lines: Polylines, count: int) -> Polylines:
 
 
 def _shares(grids: Sequence[Floats], count: int) -> Ints:
-    """The number (len(grids),) of lines of each head, in proportion to its mean section, ``count`` in all."""
+    """The number (len(grids),) of lines of each head, in proportion to its mean cross-section, ``count`` in all."""
     arms = [grid - grid.mean(axis=0) for grid in grids]
     corners = [np.cross(arm, np.roll(arm, -1, axis=0)).sum(axis=0) for arm in arms]
     areas = [np.linalg.norm(one, axis=1).mean() for one in corners]

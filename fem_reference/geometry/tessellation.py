@@ -1,6 +1,6 @@
-"""Closed triangulated surfaces of bones of closed form, for pictures and for code that needs the surface of a bone.
+"""Closed triangulated surfaces of bones of simple shapes, for pictures and for code that needs the surface of a bone.
 
-Their vertices lie on the body. A ball, a capsule and a box are built in one way: from the octants of a sphere, moved apart.
+Their vertices lie on the body. A ball, a capsule and a box are built in the same way, from the octants of a sphere moved apart.
 """
 
 import numpy as np
@@ -16,10 +16,10 @@ _REACH, _THICKNESS = 1.5, 0.1
 
 
 def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -> Surface:
-    """The closed outward surface of a body of closed form, with ``turn`` sides per full turn; errors name ``place``.
+    """The closed outward surface of a body of simple shape, with ``turn`` sides per full turn; errors name ``place``.
 
-    A half-space extends past the points ``beside`` (n, 3) [mm]: as it is infinite, it is represented by a slab, of which
-    only the vertices in the plane lie on the body.
+    A half-space, which is infinite, is represented by a slab that extends past the points ``beside`` (n, 3) [mm]; only its
+    vertices in the plane lie on the body.
     """
     match solid:
         case HalfSpace():
@@ -38,7 +38,7 @@ def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -
         case Cylinder():
             points, triangles = _prism(solid, turn)
         case _:
-            raise TypeError(f"{type(solid).__name__} is not a body of closed form")
+            raise TypeError(f"{type(solid).__name__} is not a body of a simple shape")
     return Surface(points, triangles, place)
 
 
@@ -63,8 +63,8 @@ def _rounded(size: Vector, rounding: float, turn: int) -> tuple[Floats, Ints]:
 
 
 def _ticks(half: float, rounding: float, count: int) -> tuple[Floats, Floats]:
-    """The rounded corners at -``half`` and ``half`` along an axis, each in ``count`` steps of equal angles from the middle of a
-    face to the edge of a cube: the tangents of the angles, and the centre of each. Two corners about one centre share their middle.
+    """The tangents of the angles, and the centres, of the rounded corners at -``half`` and ``half`` along an axis. Each corner has
+    ``count`` equal steps of angle from the middle of a face to the edge of a cube; two corners about one centre share their middle.
     """
     if rounding == 0:
         return np.array([-1.0, 1.0]), np.array([-half, half])

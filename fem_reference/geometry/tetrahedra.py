@@ -37,21 +37,21 @@ log = logging.getLogger(__name__)
 SECONDS_ALLOWED = 240.0
 _ROUNDED = 6  # decimals [mm] in the mesher's frame: far below any size, far above the round-off from moving a surface
 _VOLUME_WITHIN = (
-    0.05  # relative; a smaller value fails, as the volume of a surface that intersects itself is not well defined
+    0.05  # relative; a smaller value fails, as a surface with self-intersections has no well-defined volume
 )
-_MOST_TETS = 3e6  # needs some GB and minutes, far more than a solver can use
+_MOST_TETS = 3e6  # a mesh that takes some GB and some minutes, and is far too large for a solver
 _MAKERS = {"gmsh": "gmsh", "tetwild": "fTetWild"}
-_SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the requested number of triangles, tried in turn
+_SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # shares of the requested number of triangles, tried in turn
 
 
 def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] | None = None) -> TetMesh:
     """Tetrahedra of edge length ``size`` [mm] that fill a closed, outward ``surface`` of m triangles. Tetrahedra by gmsh have
-    ``facets`` for each attachment; its ``shares`` (m, 3) are the attached shares of the corners of triangles. ``maker`` names the
+    ``facets`` for each attachment; ``shares`` (m, 3) by attachment are the attached shares of triangle corners. ``maker`` names the
     mesher. InputError if no mesher succeeds, and at once if ``size`` is far too small or too large.
 
-    A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface without
+    A surface finer than ``size`` is coarsened first, with edges along the rims of attachments. gmsh fills a surface without
     self-intersections and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so that it moves with
-    the surface. If gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (its issue 72).
+    the surface. If gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (see its issue 72).
     """
     origin, axes = _own_frame(surface.points)
     local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
@@ -66,7 +66,7 @@ def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] |
 def check_size(surface: Surface, size: float) -> None:
     """Raise InputError if more than ``_MOST_TETS`` regular tets fill a surface, or ``size`` exceeds its smallest extent.
 
-    The extent is measured in the frame of its vertices, so that rotating the surface changes nothing.
+    The extent is measured in the frame of the vertices, so that rotating the surface changes nothing.
     """
     volume, extent = enclosed_volume(surface.points, surface.triangles), np.ptp(surface.points, axis=0).min()
     if not volume <= _MOST_TETS * size**3 / (6 * np.sqrt(2)):
@@ -100,12 +100,12 @@ def _mesh(surface: Surface, size: float, shares: Mapping[str, Floats]) -> TetMes
         reason = f"{crossing} triangles pass through the surface"
     else:
         try:
-            log.info("%s: gmsh fills %d triangles", surface.place, len(coarse.triangles))
+            log.info("%s: gmsh fills a surface of %d triangles", surface.place, len(coarse.triangles))
             mesh = checked(run("gmsh", coarse, size), coarse)
             return replace(mesh, facets=_labelled(mesh, coarse, labels, list(shares)))
         except InputError as error:
             reason = str(error)
-    log.warning("%s: meshed by fTetWild, differently each time, as gmsh cannot: %s", surface.place, reason)
+    log.warning("%s: meshed by fTetWild, anew each time, as gmsh failed: %s", surface.place, reason)
     return checked(run("tetwild", surface, size), surface)
 
 
@@ -118,8 +118,8 @@ def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) ->
 
 
 def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> tuple[Surface, Ints]:
-    """The surface with as many triangles as equilateral triangles of side ``size`` would need to cover it, unchanged if it has
-    fewer, with edges along the rims of attachments; and the labels of its triangles, 0 if free.
+    """The surface with edges along the rims of attachments, and the labels of its triangles, 0 if free. It has as many triangles as
+    equilateral triangles of side ``size`` would need to cover it; it is unchanged if it has fewer.
 
     If the coarse surface intersects itself, a few other counts are tried, and then a surface without rims.
     """
@@ -133,7 +133,7 @@ def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> t
                 coarse, labels = with_rims(coarse, surface, rims, size)
             if len(self_intersections(coarse)) == 0:
                 if shares and not rims:
-                    crossing = "without the rims of attachments, which would pass through the surface"
+                    crossing = "meshed without the rims of attachments, which would pass through the surface"
                     log.warning("%s: %s", surface.place, crossing)
                 return _near(coarse, surface, size), labels
     return _near(coarse, surface, size), labels
@@ -171,7 +171,7 @@ def run(mesher: str, surface: Surface, size: float) -> TetMesh:
         if no_room := next((words for words in map(os.strerror, NO_ROOM) if words in done.stderr), None):
             raise OSError(f"{folder}: cannot be written: {no_room}; tetrahedra of {surface.place} need room there")
         if done.returncode != 0 or not result.exists():
-            raise InputError(surface.place, f"a surface that {mesher} refuses ({last_words(done)})", "a clean surface")
+            raise InputError(surface.place, f"a surface that {mesher} rejects ({last_words(done)})", "a clean surface")
         with np.load(result, allow_pickle=False) as arrays:
             return TetMesh(arrays["points"], arrays["tets"], maker=_MAKERS[mesher])
 
@@ -186,8 +186,8 @@ def last_words(done: subprocess.CompletedProcess[str]) -> str:
 def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
     """The largest connected part of ``mesh``, its tets of positive volume, without unused points.
 
-    InputError if nothing is left, a tet is flat, or the volume of the tets is far from that in ``surface``. Their boundary
-    is closed, as no triangle belongs to more than two of them.
+    InputError if nothing is left, a tet is flat, or the volume of the tets is far from that in ``surface``. The boundary
+    of the tets is closed, as no triangle belongs to more than two tets.
     """
     if len(mesh.tets) == 0:
         raise InputError(surface.place, "no tetrahedra from the mesher", "a surface that bounds a body")
@@ -198,7 +198,7 @@ def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
         raise InputError(surface.place, "a tetrahedron of zero volume from the mesher", "a cleaner surface")
     got, wanted = np.abs(volumes).sum(), enclosed_volume(surface.points, surface.triangles)
     if not abs(got - wanted) <= _VOLUME_WITHIN * wanted:
-        volumes_got = f"tetrahedra of {got:.0f} mm3 in a surface of {wanted:.0f} mm3"
+        volumes_got = f"tetrahedra of {got:.0f} mm3 in a surface that encloses {wanted:.0f} mm3"
         raise InputError(surface.place, volumes_got, "one clean body")
     return TetMesh(points, upright(points, tets), maker=mesh.maker)
 

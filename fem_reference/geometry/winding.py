@@ -26,8 +26,8 @@ _CHECKED = 200
 class Winding:
     """n paths through K ``knots`` (n, K, 3) [mm], whose unit ``tangents`` are (n, K, 3), after the lengths ``arcs`` (n, K) [mm].
 
-    They follow the obstacles ``met`` (n, m) in turn, each over the same number of knots; on a path with fewer than m obstacles, all
-    other knots are at the end. ``failed`` (n,) is True if Newton's method found no path.
+    The paths follow the obstacles ``met`` (n, m) in turn, each over the same number of knots; on a path with fewer than m obstacles
+    the remaining knots are at the end. ``failed`` (n,) is True if Newton's method found no path.
     """
 
     knots: Floats
@@ -152,7 +152,7 @@ class _Pieces:
 
 @np.errstate(all="ignore")  # NaN counts as failed
 def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Winding:
-    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``; both ends are outside these."""
+    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``, which contain neither end."""
     string = taut(obstacles, starts, ends)
     turns = met(obstacles, string)
     found = Winding.straight(len(obstacles), starts, ends)
@@ -162,7 +162,7 @@ def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> 
         if not pattern:
             continue
         pieces, smooth = _solved(_guess([(j, obstacles[j]) for j in pattern], string[which]))
-        short = (pieces.sizes <= 0) | ~pieces.pressed()  # (m, n): the obstacle is not met after all
+        short = (pieces.sizes <= 0) | ~pieces.pressed()  # (m, n): the path does not meet the obstacle
         for left_out in {tuple(column) for column in short.T.tolist()}:
             same = np.flatnonzero(np.all(np.array(left_out) == short.T, axis=1))
             if any(left_out):
@@ -221,7 +221,7 @@ def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
     most = np.array([[one.bend / 2, one.bend / 2, 0.5, one.bend] for one in pieces.obstacles]).ravel()
     todo, part, kinks = np.arange(len(near)), pieces, pieces.kinks()
     for _ in range(_ITERATIONS):
-        left = ~(np.abs(kinks).max(axis=1) <= near[todo])  # NaN too
+        left = ~(np.abs(kinks).max(axis=1) <= near[todo])  # also True for NaN
         if not left.any():
             return pieces, np.ones(len(near), dtype=bool)
         part, kinks, todo = part.rows(np.flatnonzero(left)), kinks[left], todo[left]
@@ -249,7 +249,7 @@ def _better(pieces: _Pieces, change: Floats, before: Floats) -> tuple[_Pieces, F
 
 
 def _geodesic(obstacle: SmoothSurface, points: Floats, along: Floats, sizes: Floats) -> tuple[Floats, Floats]:
-    """Points and unit tangents (steps + 1, n, 3) from ``points`` ``along`` (n, 3) by ``sizes`` (n,): Runge-Kutta's method."""
+    """Points and unit tangents (steps + 1, n, 3) from ``points`` ``along`` (n, 3) by ``sizes`` (n,), by the Runge-Kutta method."""
     step, path = (sizes / _STEPS)[:, None], [(points, along)]
     half, bent = step / 2, obstacle.curving
     for _ in range(_STEPS):

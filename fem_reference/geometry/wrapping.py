@@ -18,8 +18,8 @@ from fem_reference.geometry.obstacles import Quadric, Touch
 class Paths:
     """n paths: ``parts`` (n, 3) [mm], their lengths before, along and after the surface; a straight path is entirely before it.
 
-    ``starts``, ``ends``, and ``touches``, the points where each meets and leaves the surface: (n, 3) [mm]. Along it a path turns
-    by ``turns`` (n,) [rad] about the unit ``axes`` (n, 3) through ``middles`` (n, 3) and climbs along them evenly.
+    ``starts``, ``ends``, and ``touches``, the points where each meets and leaves the surface: (n, 3) [mm]. Along the surface a path
+    turns by ``turns`` (n,) [rad] about the unit ``axes`` (n, 3) through ``middles`` (n, 3) and climbs evenly along them.
     """
 
     parts: Floats
@@ -36,7 +36,7 @@ class Paths:
         return np.zeros(len(self.parts), dtype=bool)
 
     def touching(self) -> list[Touch]:
-        """The one obstacle, as if paths met it at their starts and left it at their ends: the resultant force on it is the same."""
+        """The obstacle, as if paths met it at their starts and left it at their ends: the resultant force on it is the same."""
         first, last = self.directions()
         return [Touch(np.zeros(len(self.parts), dtype=np.int64), self.starts, first, self.ends, last)]
 
@@ -73,8 +73,8 @@ class Paths:
 
 
 def around(obstacle: Quadric, starts: Floats, ends: Floats) -> Paths:
-    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along the great circle through both
-    points, any such circle if they are opposite each other; or a cylinder, along a helix. Points inside count as on the surface.
+    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along a great circle through both
+    points, or around a cylinder, along a helix. Points inside count as on the surface.
     """
     middle = obstacle.pose[:3, 3]
     if np.isfinite(obstacle.radii[2]):
@@ -98,8 +98,8 @@ def _around(starts: Floats, ends: Floats, middle: Floats, axes: Floats, radius: 
     """The paths that turn from starts to ends, by at most half a turn, about ``axes`` (n, 3) through ``middle`` (3,).
 
     In a view along the axis, points at distances d1, d2 from it and an angle t apart are joined by tangents of lengths
-    sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)), or straight if this angle is not positive. The displacement
-    along the axis is distributed evenly over this length: unrolled, the path is a straight line.
+    sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)). If this angle is not positive, the path is straight. The
+    displacement along the axis is distributed evenly over this length: unrolled, the path is a straight line.
     """
     one, other = _across(starts - middle, axes), _across(ends - middle, axes)
     sines, cosines = np.sum(np.cross(one, other) * axes, axis=1), np.sum(one * other, axis=1)
@@ -146,7 +146,7 @@ def _across(vectors: Floats, axes: Floats) -> Floats:
 
 
 def _perpendicular(normals: Floats, arms: Floats) -> Floats:
-    """``normals`` (n, 3) scaled to length 1; for a normal that is only rounding, some direction perpendicular to its arm."""
+    """``normals`` (n, 3) scaled to length 1; for a normal that is only round-off, some direction perpendicular to its arm."""
     sizes = np.linalg.norm(normals, axis=1)[:, None]
     squares = np.sum(arms**2, axis=1)[:, None]
     spare = np.cross(arms, np.eye(3)[np.argmin(np.abs(arms), axis=1)])

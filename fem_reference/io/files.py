@@ -23,15 +23,15 @@ from fem_reference.io.formats import Format, formats, vtk
 from fem_reference.io.formats.msh import read_mesh
 from fem_reference.io.texts import beside, check_size, is_file, parsed_xml
 
-# The most bytes of a mesh, a table or an index: a million triangles, more than our meshers and solvers can use. The values of a
-# text file need up to thirty times the memory of the file.
+# The largest size in bytes of a mesh, a table or an index: a million triangles, more than our meshers and solvers can use. The
+# values of a text file need up to thirty times as much memory as the file.
 MOST_BYTES = 2**26
-# The age [s] above which a half-written file is removed if its process does not run here; a newer one may have a process elsewhere.
+# A half-written file older than this [s] is removed unless its process runs here; a newer file may be written by another machine.
 _SETTLED = 10.0
 
 
 def shares_points(place: str) -> bool:
-    """True if triangles read from ``place`` share points, in the order of the file; False if each has three of its own."""
+    """True if triangles read from ``place`` share points, in the order of the file; False if each has its own three points."""
     found = formats().get(Path(place).suffix.lower())
     return found is None or found.shares_points
 
@@ -50,7 +50,7 @@ def read_surface(path: Path, unit: float) -> Surface:
     An STL file has no shared points: its surface has three points for each triangle. InputError if the file cannot be read
     completely or has polygons other than triangles.
     """
-    want = f"a triangle surface, whole, as {' '.join(formats())}"
+    want = f"a complete triangle surface as {' '.join(formats())}"
     read = _format(path, want, formats()).read
     points, triangles = _attempt(lambda file: soup.arrays(read(file)), path, want)
     return Surface(points * unit, triangles, str(path))
@@ -58,7 +58,7 @@ def read_surface(path: Path, unit: float) -> Surface:
 
 def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) -> Surface:
     """The boundary of the tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of the cells (for gmsh
-    ``gmsh:physical``); coordinates are in units of ``unit`` mm. InputError if the file lacks the array or all of the labels.
+    ``gmsh:physical``); coordinates are in units of ``unit`` mm. InputError if the file lacks the array or all labels.
     """
     want = (
         f'tetrahedra with an array "{array}" of integers, some of them {", ".join(map(str, labels))}, as .vtu or .msh'
@@ -69,11 +69,11 @@ def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) 
 
         mesh = read_mesh(file) if file.suffix.lower() == ".msh" else vtu.read(file)
         if array not in mesh.cell_data:
-            raise ValueError(f"arrays {', '.join(mesh.cell_data) or 'of none'}")
+            raise ValueError(f"cell arrays: {', '.join(mesh.cell_data) or 'none'}")
         blocks = zip(mesh.cells, mesh.cell_data[array], strict=True)
         found = [cells.data[np.isin(values, list(labels))] for cells, values in blocks if cells.type == "tetra"]
         if not sum(map(len, found)):
-            raise ValueError("no such tetrahedra")
+            raise ValueError("no tetrahedra with these labels")
         used, corners = np.unique(boundary(np.concatenate(found).astype(np.int64))[0], return_inverse=True)
         return soup.arrays((np.asarray(mesh.points)[used], corners.reshape(-1, 3)))
 
@@ -87,7 +87,7 @@ def read_polylines(path: Path, unit: float, *, moved: bool = False) -> Polylines
     InputError if the file cannot be read completely. ``moved``: True for lines of a moved state; in a state at rest, a point that
     is not finite or a line without length is an error too.
     """
-    want = f"polylines, whole, as {' or '.join(vtk.LINES)}"
+    want = f"complete polylines as {' or '.join(vtk.LINES)}"
     _format(path, want, vtk.LINES)
     points, lines = _attempt(lambda file: vtk.read_lines(file, moved=moved), path, want)
     offsets = np.cumsum([0, *(len(line) for line in lines)])
@@ -96,7 +96,7 @@ def read_polylines(path: Path, unit: float, *, moved: bool = False) -> Polylines
 
 def read_points(path: Path) -> Floats:
     """The points (n, 3) of a VTK file with cells of any kind."""
-    return np.asarray(_attempt(vtk.data_set, path, "a VTK file, whole").points, float)
+    return np.asarray(_attempt(vtk.data_set, path, "a complete VTK file").points, float)
 
 
 def read_xdmf(path: Path, unit: float) -> list[tuple[float, Surface]]:
@@ -121,7 +121,7 @@ def read_pvd(path: Path) -> list[tuple[float, Path]]:
 
 
 def read_rows(path: Path) -> list[list[str]]:
-    """The rows of a comma separated file, cells stripped, without empty lines and lines that begin with ``#``."""
+    """The rows of a comma-separated file with cells stripped, without empty lines and lines that begin with ``#``."""
 
     def read(table: Path) -> list[list[str]]:
         lines = table.read_text(encoding="utf-8-sig").splitlines()
@@ -129,11 +129,11 @@ def read_rows(path: Path) -> list[list[str]]:
         rows = csv.reader(table_lines, skipinitialspace=True)
         return [[cell.strip() for cell in row] for row in rows]
 
-    return _attempt(read, path, "a comma separated table in UTF-8")
+    return _attempt(read, path, "a comma-separated table in UTF-8")
 
 
 def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
-    """The surface with its points at ``positions`` (n, 3) [mm]; in VTK's formats with point data ``displacement`` [mm], float64."""
+    """Write a surface with its points at ``positions`` (n, 3) [mm], in VTK with point data ``displacement`` [mm], float64."""
     written = [suffix for suffix, one in formats().items() if one.write]
     write = _format(path, f"one of {' '.join(written)}", written).write
     assert write is not None  # the suffix is one of the written formats
@@ -142,14 +142,14 @@ def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
 
 
 def write_polylines(path: Path, polylines: Polylines, positions: Floats) -> None:
-    """VTP or VTK of the lines with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
+    """Write lines as VTP or VTK with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
     _format(path, f"one of {' '.join(vtk.LINES)}", vtk.LINES)
     with whole(path) as part:
         vtk.save(part, positions, polylines, positions - polylines.points)
 
 
 def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
-    """VTU of the tets with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
+    """Write tets as VTU with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
     with whole(path) as part:
         vtk.save(part, positions, mesh.tets, positions - mesh.points)
 
@@ -157,7 +157,7 @@ def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
 def write_field(
     path: Path, points: Floats, cells: Ints, data: dict[str, Floats], cell_data: dict[str, Floats] | None = None
 ) -> None:
-    """VTU or gmsh's MSH of ``cells`` (m, 2 to 4) between ``points`` (n, 1 to 3), with arrays by name, (n, ...) or (m, ...)."""
+    """Write ``cells`` (m, 2 to 4) between ``points`` (n, 1 to 3) as VTU or MSH, with arrays by name, (n, ...) or (m, ...)."""
     import meshio
 
     space = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
@@ -168,7 +168,7 @@ def write_field(
 
 
 def write_pvd(path: Path, frames: Sequence[tuple[float, str]]) -> None:
-    """Write a PVD index: the time of each file (for frames their number), and its path relative to the index."""
+    """Write a PVD index: the time of each file (the number of a frame), and its path relative to the index."""
     entries = "".join(f'<DataSet timestep="{time}" file={quoteattr(name)}/>\n' for time, name in frames)
     collection = f'<VTKFile type="Collection"><Collection>\n{entries}</Collection></VTKFile>\n'
     write_text(path, f'<?xml version="1.0"?>\n{collection}')

@@ -12,7 +12,7 @@ Soup = tuple[Any, Any]
 
 
 def arrays(soup: Soup) -> tuple[Floats, Ints]:
-    """Points (n, 3) and triangles (m, 3) as arrays; ValueError or OverflowError where ``soup`` has no such shapes."""
+    """Points (n, 3) and triangles (m, 3) as arrays; ValueError or OverflowError if ``soup`` has no such shapes."""
     points, corners = (np.asarray(values) for values in soup)
     if len(corners) == 0:
         raise ValueError("no triangles")
@@ -28,7 +28,7 @@ def arrays(soup: Soup) -> tuple[Floats, Ints]:
 
 
 def check_lengths(points: Floats, lines: list[list[int]]) -> None:
-    """ValueError if one of ``points`` (n, 3) is not finite or one of the ``lines`` between them has no length."""
+    """Raise ValueError if one of ``points`` (n, 3) is not finite or one of the ``lines`` between them has no length."""
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
         raise ValueError(f"a point that is not finite (point {bad[0]})")
@@ -49,20 +49,20 @@ def joined(cells: list[list[int]]) -> list[list[int]]:
             line += after[line[-1]][1:]
         lines.append(line)
     if sum(len(line) - 1 for line in lines) != sum(len(cell) - 1 for cell in cells):
-        raise ValueError("lines that close to a ring")
+        raise ValueError("lines that form a closed ring")
     return lines
 
 
 def only_triangles(corners: set[int]) -> None:
-    """ValueError if a polygon has more or fewer corners than three."""
+    """Raise ValueError if a polygon has more or fewer corners than three."""
     if other := corners - {3}:
-        raise ValueError(f"a polygon of {min(other)} corners")
+        raise ValueError(f"a polygon with {min(other)} corners")
 
 
 def positions(rows: list[list[float]]) -> Any:
-    """Points (n, 3) from n ``rows``; ValueError if one has fewer coordinates."""
+    """Points (n, 3) from n ``rows``; ValueError if a row has fewer coordinates."""
     if any(len(row) != 3 for row in rows):
-        raise ValueError("a position of fewer than three coordinates")
+        raise ValueError("a position with fewer than three coordinates")
     return np.array(rows)
 
 
@@ -98,13 +98,13 @@ class DataSet(NamedTuple):
 
 
 def checked_cells(sizes: Any, corners: Any, points: int) -> PointLists:
-    """Cells of ``sizes`` (m,) in ``corners``; ValueError if one has a negative size or a point that does not exist."""
+    """Cells of ``sizes`` (m,) in ``corners``; ValueError if a cell has a negative size or a point that does not exist."""
     sizes, corners = np.asarray(sizes, np.int64), np.asarray(corners, np.int64)
     if (sizes < 0).any() or (sizes > len(corners)).any() or sizes.sum() != len(corners):
         raise ValueError(f"cells that do not fit in their {len(corners)} corners")
     if len(wrong := np.flatnonzero((corners < 0) | (corners >= points))):
         cell = np.searchsorted(np.cumsum(sizes), wrong[0], side="right")
-        raise ValueError(f"cell {cell} with a point that does not exist, of {points}")
+        raise ValueError(f"cell {cell} with a point outside 0 to {points - 1}")
     return PointLists(sizes, corners)
 
 
@@ -116,6 +116,6 @@ def whole_number(text: str, name: str) -> int:
 
 
 def check_number(values: Any, count: int, name: str) -> None:
-    """ValueError if there are not ``count`` values of this ``name``."""
+    """Raise ValueError unless there are ``count`` values; the message names them by ``name``."""
     if len(values) != count:
-        raise ValueError(f"{len(values)} {name} of {count}")
+        raise ValueError(f"{len(values)} {name} instead of {count}")

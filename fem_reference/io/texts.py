@@ -1,4 +1,4 @@
-"""TOML, JSON and XML from untrusted files: bounded in size and depth, so that reading them ends.
+"""TOML, JSON and XML from untrusted files: bounded in size and depth, so that reading always ends.
 
 A file is refused if it cannot be parsed, is too large, is nested too deeply, or refers to files outside its folder.
 """
@@ -18,10 +18,10 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 
-# The most bytes of a file: a case file has some kB, a baseline 1.3 kB per frame. The contents need up to thirty times the memory.
+# The largest size of a file in bytes: a case file has some kB, a baseline 1.3 kB per frame. The values need up to 30 times as much.
 MOST_TOML = 2**21
 MOST_JSON = 2**25
-# The most levels of nested tables and lists; case files have up to 6.
+# The largest number of levels of nested tables and lists; case files have up to 6.
 DEEPEST = 32
 # A mesh file may not define entities: they can multiply a text a billion times, or include other files.
 _FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")
@@ -67,7 +67,7 @@ def parsed_xml(path: Path) -> ElementTree.Element:
 
 
 def check_no_entities(text: bytes) -> None:
-    """ValueError if an XML text has a document type."""
+    """Raise ValueError if an XML text has a document type."""
     if any(one in text for one in _FORBIDDEN):
         raise ValueError("a document type, which no mesh file needs")
 
@@ -113,7 +113,7 @@ def is_file(path: Path) -> bool:
 
 
 def check_size(path: Path, most: int, want: str) -> None:
-    """InputError if a file has more than ``most`` bytes."""
+    """Raise InputError if a file has more than ``most`` bytes."""
     if (size := path.stat().st_size) > most:
         raise InputError(path, f"a file of {size / 2**20:.0f} MB", f"{want}, of at most {most / 2**20:.0f} MB")
 
@@ -129,11 +129,11 @@ def _text(path: Path, most: int, want: str) -> str:
 
 
 def _no_number(name: str) -> float:
-    raise ValueError(f"{name}, which is no JSON number")
+    raise ValueError(f"{name}, which is not a JSON number")
 
 
 def _parsed(loads: Callable[[str], Any], text: str, place: object, want: str) -> Any:
-    """The value that ``loads`` reads from a text; InputError if it fails, or where the value is nested too deeply."""
+    """The value that ``loads`` reads from a text; InputError if it fails, or if the value is nested too deeply."""
     try:
         value = loads(text)
         level = [value]

@@ -1,4 +1,4 @@
-"""Time series in XDMF, by meshio, with their numbers in the file itself or in HDF5 files beside it."""
+"""Time series in XDMF, read with meshio, with their numbers in the file itself or in HDF5 files beside it."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -11,7 +11,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.io import soup
 from fem_reference.io.texts import beside, parsed_xml
 
-# The most numbers of one array: ten million points.
+# The largest number of values in an array: ten million points.
 _MOST = 3 * 10**7
 
 
@@ -31,19 +31,19 @@ def _displacement(data: dict[str, Any], points: Floats) -> Any:
     """The displacement in the point ``data`` of a step; ValueError unless it has the shape of ``points``."""
     name = next((name for name in ("displacement", "u") if np.shape(data.get(name, 0)) == points.shape), None)
     if name is None:
-        raise ValueError(f"point data {', '.join(data) or 'nothing'} in a step")
+        raise ValueError(f"point data {', '.join(data) or '(none)'} in a step")
     return data[name]
 
 
 def _check(item: Element, path: Path) -> None:
-    """ValueError if numbers are not in the file at ``path`` or in HDF5 files beside it, or are too many."""
+    """Raise ValueError if numbers are not in the file at ``path`` or in HDF5 files beside it, or are too many."""
     if item.get("Format") == "XML":
         return
     if item.get("Format") != "HDF":
         raise ValueError(f'numbers in the format "{item.get("Format")}"')
     name, colon, place = (item.text or "").strip().partition(":")
     if not colon or not place.startswith("/"):
-        raise ValueError(f'"{item.text}", which is no FILE:/PLACE')
+        raise ValueError(f'"{item.text}", which is not FILE:/PLACE')
     import h5py
 
     with h5py.File(beside(path, name), "r") as file:
@@ -51,17 +51,17 @@ def _check(item: Element, path: Path) -> None:
 
 
 def _check_dataset(file: Any, place: str) -> None:
-    """ValueError if the dataset at a ``place`` in an HDF5 file is stored outside of the file, or is too large."""
+    """Raise ValueError if the dataset at a ``place`` in an HDF5 file is stored outside this file, or is too large."""
     import h5py
 
     names = ["", *place.strip("/").split("/")]
     steps = ["/".join(names[: i + 1]) or "/" for i in range(len(names))]
     for above, step in pairwise(steps):
         if not isinstance(file[above].get(step.rpartition("/")[2], getlink=True), h5py.HardLink):
-            raise ValueError(f'"{step}", a link to elsewhere')
+            raise ValueError(f'"{step}", a link to another place')
     dataset = file[place]
     own = isinstance(dataset, h5py.Dataset) and not (dataset.external or dataset.is_virtual)
     if not own or dataset.dtype.kind not in "fiu":
-        raise ValueError(f'"{place}", which is no array of numbers in this file')
+        raise ValueError(f'"{place}", which is not an array of numbers in this file')
     if dataset.size > _MOST:
         raise ValueError(f'{dataset.size} numbers at "{place}", more than {_MOST}')

@@ -1,8 +1,8 @@
 """Metrics: one file each, named as in scene files and JSON. A metric does not know the solver of a run.
 
-Contract (tests/contracts/test_every_metric.py): a run against itself gives zero, a known change a known value, NaN stays NaN, and
-units are stated. Each metric describes its ``STATISTICS`` and states the part of a run that it measures (``OF``: surface, lines or
-field) and its standard (``AGAINST``): the reference (or the rest state), the exact solution, or the run itself.
+Contract (tests/contracts/test_every_metric.py): a run against itself gives zero, a known change gives a known value, NaN stays
+NaN, and units are stated. Each metric describes its ``STATISTICS`` and states the part of a run that it measures (``OF``: surface,
+lines or field) and its standard (``AGAINST``): the reference (or the rest state), the exact solution, or the run itself.
 """
 
 import importlib
@@ -24,9 +24,9 @@ from fem_reference.problems.setup import Bone, Joint, Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Part, Standard
 
-# Places where pages show a statistic: ``main``, notebooks and omissions; ``table``, the first table of a comparison; ``headline``,
-# its sentence; ``curve``, drawings of changes from rest; ``angle``, those over the angle of a joint; ``solvers``, tables of
-# solvers; ``scenes``, the table over all scenes; ``rank``, rankings of solvers; ``claim``, error bars compared with true errors.
+# Places where pages show a statistic. ``main``: notebooks and omitted effects; ``table``: the first table of a comparison;
+# ``headline``: its summary; ``curve``: plots of changes from rest; ``angle``: plots over a joint's angle; ``solvers``: tables of
+# solvers; ``scenes``: the table of all scenes; ``rank``: rankings of solvers; ``claim``: error bars compared with true errors.
 Shown = Literal["main", "table", "headline", "curve", "angle", "solvers", "scenes", "rank", "claim"]
 
 
@@ -35,8 +35,8 @@ class Statistic:
     """The description of a statistic by its metric.
 
     ``title`` and ``part``: headings of the group of columns and of the column. ``headline``: a sentence with ``{}`` for the value.
-    ``curve``: the title of the drawing of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: its position by
-    place, the least first. ``local``: True if its error has the order of the error at the worst place. ``lone``: True for the value
+    ``curve``: the title of the plot of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: its rank by
+    place, from the least. ``local``: True if its error has the order of the error at the worst place. ``lone``: True for the value
     of a single fibre or of the force on a bone, which is not a mean. ``pooled``: True if the statistics of its metric belong to one
     field in one unit; the rms of all then replaces a difference that is small by chance.
     """
@@ -54,12 +54,12 @@ class Statistic:
 
     @property
     def label(self) -> str:
-        """Title and part in one."""
+        """The title and the part in one text."""
         return f"{self.title}, {self.part}" if self.part else self.title
 
     @property
     def full_unit(self) -> str:
-        """The unit; for per cent together with the quantity that is 100 %."""
+        """The unit, and for per cent also the quantity that is 100 %."""
         return f"{self.unit} of {self.share_of}" if self.share_of else self.unit
 
 
@@ -103,7 +103,7 @@ class Measure:
 @dataclass(frozen=True)
 class Worst:
     """A measure in its worst ``frame`` (a number, at ``index``). ``value`` and ``error_bar``, the bar of the reference (None if
-    there is none), are in ``unit``; ``where`` is the place in words.
+    it has none), are in ``unit``; ``where`` is the place in words.
     """
 
     value: float
@@ -118,7 +118,7 @@ class Worst:
 class MeasurementContext:
     """The common context of all measurements of a case. ``areas`` (n,) [mm2]: areas around the surface's vertices at rest.
     ``fibres``: the fibres at rest. ``extension``: carries a surface's displacement to the fibres' points. ``travel`` [mm]: the
-    greatest displacement of the reference's surface over its frames. ``bones``; ``exempt``: the part without contact with them;
+    greatest displacement of the reference's surface over its frames. ``bones``; ``exempt``: the part exempt from their contact;
     ``joints``; ``ends``: the ends of the fibres, None without attachments.
     """
 

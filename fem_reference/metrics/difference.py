@@ -1,4 +1,4 @@
-"""Distance of a field from the reference's at the vertices, as a share of the reference's greatest value."""
+"""Difference between a field and the reference at the vertices, as a share of the reference's greatest value."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ OF, AGAINST = "field", "reference"
 
 
 def measure(run: Run, reference: Run, _context: FieldContext) -> tuple[Measure, ...]:
-    """``max``, the greatest distance at a vertex over the reference's greatest magnitude; the distance itself if this is 0."""
+    """``max``, the greatest difference at a vertex divided by the reference's greatest magnitude; undivided if this is 0."""
     size = np.abs(reference.vertex_values).max(axis=1)
     apart = np.abs(run.vertex_values - reference.vertex_values)
     values = apart.max(axis=1) / np.where(size > 0, size, 1.0)

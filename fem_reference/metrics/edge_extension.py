@@ -1,6 +1,6 @@
 """Lengths of the edges of a run's surface, compared with the reference, in per cent of their rest length.
 
-Against rest this is the edge extension of the report (l / L of Figs 6.15 to 6.17) less one.
+Against rest this is the edge extension of the report (l / L of Figs 6.15 to 6.17) minus one.
 """
 
 import numpy as np

@@ -1,5 +1,5 @@
-"""Energy that a muscle stores, by all its effects, springs and contact: minus its slope in the angle is the moment about a joint.
-Only some solvers compute energy. Without dissipation its change is the work of the bones; at rest it is that of initial stresses.
+"""Energy stored in a muscle by all its effects, springs and contact; only some solvers compute it. The moment about a joint is
+minus its derivative by the angle. Without dissipation its change is the work of the bones; at rest it is due to initial stresses.
 """
 
 from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures

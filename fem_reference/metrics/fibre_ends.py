@@ -1,4 +1,4 @@
-"""Distances of the ends of fibres from their places on the moving bones; of the run alone, independent of the reference. An end of
+"""Distances of the ends of fibres from their places on the moving bones, in the run alone, independent of the reference. An end of
 a fibre at an attachment moves with its bone. Fibres from a file may end beside the attached area: such fibres do not follow the
 bone, and differ in length and moment arm from fibres that reach it. A run without fibres is measured on points that its surface
 carries. :func:`fem_reference.problems.fibre_ends.attached_ends` gives the attachment of an end.
@@ -11,7 +11,7 @@ from fem_reference.metrics.fibre_length import fibre_points
 from fem_reference.problems.fibre_ends import ends_of
 from fem_reference.runs.store import Run
 
-_TITLE = "Ends of fibres off their bones"
+_TITLE = "Distance of fibre ends from bones"
 STATISTICS = {
     "mean": Statistic("mm", _TITLE, "mean", local=True),
     "max": Statistic(
@@ -23,8 +23,8 @@ OF, AGAINST = "lines", "itself"
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """``mean`` and ``max`` over the ends of all fibres of ``|x(X) - x_bone(X)|`` [mm]: the position of an end less its rest
-    position moved by the pose of its bone, also where a tendon continues to the bone. No measures for an unattached muscle.
+    """``mean`` and ``max`` over the ends of all fibres of ``|x(X) - x_bone(X)|`` [mm]: the position of an end minus its rest
+    position moved by the pose of its bone, even if a tendon continues to the bone. An unattached muscle has no such measures.
     """
     if context.ends is None:
         return ()

@@ -30,9 +30,9 @@ STATISTICS = {
     "max_percent": _of_lines("%", _TITLE, "worst fibre", shown={"table": 30, "claim": 60}, lone=True),
 }
 OF, AGAINST = "lines", "reference"
-# Fibre points within this distance [mm] of points of the measurement context are the same, read in single precision.
+# Fibre points within this distance [mm] of points of the measurement context count as the same points in single precision.
 _SAME = 1e-3
-# The same for a run of lines alone: a reference begins up to this far from the rest state if overlaps with bones were removed.
+# The same distance for a run of lines alone: a reference begins up to this far from rest if overlaps with bones were removed.
 _RELAXED = 5.0
 
 
@@ -70,7 +70,7 @@ def fibre_points(run: Run, context: MeasurementContext) -> Floats:
 
 @np.errstate(over="ignore", invalid="ignore")
 def extension_error(reference: Run, context: MeasurementContext) -> Measure:
-    """The greatest error [mm] over the fibres of lengths by the extension, measured on the reference's own surface.
+    """The greatest error [mm], over the fibres, of lengths by the extension, measured on the reference's own surface.
 
     The error is L by extension minus L inside; NaN if the reference does not carry the fibres of the measurement context.
     """
@@ -96,7 +96,7 @@ def _lengths(run: Run, context: MeasurementContext, *, inside: bool) -> Floats:
     carries. In the rest state the bones are at their first frame.
     """
     points = run.fibre_positions if inside else [context.extension.apply(each) for each in run.positions]
-    assert points is not None  # the caller asked _carries
+    assert points is not None  # the caller has checked _carries
     numbers = run.numbers[:1] * len(run.numbers) if run.solver == "rest" else run.numbers
     return np.array([lengths_at(*at, context) for at in zip(points, numbers, strict=True)])
 

@@ -1,4 +1,4 @@
-"""Shares of a run's surface that are inside out or lie within another part of the body, against the reference.
+"""Shares of a run's surface that are inside out or lie within another part of the body, compared with the reference.
 
 The shares need only the surface, so every run has them. For a solver with an interior, the smallest det F is stricter.
 """
@@ -17,8 +17,8 @@ OF, AGAINST = "surface", "reference"
 
 
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """Shares of the surface, by its area at rest, minus the shares in the reference [%]: ``inside_out``, triangles whose outer side
-    faces a part of the body that is turned inside out, and ``overlapping``, triangles inside another part of the body.
+    """Shares of the surface, by its area at rest, minus the shares in the reference [%]. ``inside_out``: triangles whose outer side
+    faces a part of the body that is turned inside out; ``overlapping``: triangles inside another part of the body.
 
     NaN in a frame where a triangle has collapsed: it has no outer side.
     """
@@ -34,7 +34,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
 @lru_cache(maxsize=4)  # a run is measured against many others, and this takes most of the time
 def _windings(run: Run) -> Floats:
-    """The outer windings (f, m) of the triangles in each frame; of frames that repeat one array, once."""
+    """The outer windings (f, m) of the triangles in each frame, computed once for frames that share an array."""
     still = run.positions.strides[0] == 0
     once = np.array([outer_windings(run.surface.moved_to(points)) for points in run.positions[: 1 if still else None]])
     found = np.broadcast_to(once, (len(run.positions), once.shape[1]))
@@ -43,13 +43,13 @@ def _windings(run: Run) -> Floats:
 
 
 def _share(windings: Floats, areas: Floats) -> Floats:
-    """Per frame of ``windings`` (f, m), the share (f,) [%] of ``areas`` (m,) where they are above 0."""
+    """For each frame of ``windings`` (f, m), the share (f,) [%] of ``areas`` (m,) where they are above 0."""
     share = 100 * (windings > 0) @ areas / areas.sum()
     return np.where(np.isnan(windings).any(axis=1), np.nan, share)
 
 
 def _first(windings: Floats, run: Run) -> tuple[str, ...]:
-    """Per frame the triangle with the greatest of ``windings`` (f, m) and its place in the run; empty without one above 0."""
+    """For each frame the triangle with the greatest of ``windings`` (f, m) and its place in the run; empty if none is above 0."""
     found = np.argmax(windings, axis=1)
     middles = run.positions[np.arange(len(found))[:, None], run.surface.triangles[found]].mean(axis=1)
     return tuple(

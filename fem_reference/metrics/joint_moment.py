@@ -1,7 +1,7 @@
 """Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis. A
 moment is positive if it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in space.
-By virtual work, without dissipation, the moment is minus the slope of the stored energy in the angle. Lines of action pull at their
-ends, via-points and obstacles. The force is not known for lines without ``hill`` and for most fast solvers.
+By virtual work, without dissipation, the moment is minus the derivative of the stored energy with respect to the angle. Lines of
+action pull at their ends, via-points and obstacles. The force is not known for lines without ``hill`` and for most fast solvers.
 
 The arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with little
 force (docs/measures.md).
@@ -35,11 +35,11 @@ STATISTICS = {
     ),
 }
 OF, AGAINST = "lines", "reference"
-_LEAST = 1e-6  # a force below this share of the greatest one is round-off and has no arm
+_LEAST = 1e-6  # a force below this share of the greatest force is round-off and has no arm
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Differences of ``moment`` [N mm], ``force`` [N], ``arm`` [mm]: NaN if no joint turns alone; the arm also without force."""
+    """Differences of ``moment`` [N mm], ``force`` [N], ``arm`` [mm]; NaN if no joint turns alone (the arm also without force)."""
     joints = [joint for joint in context.joints if _has_force(run, joint)]
     # The rest state of a run, which has no force, is the standard for its change from rest.
     if not joints or not (reference.solver == "rest" or all(_has_force(reference, joint) for joint in joints)):
@@ -58,8 +58,8 @@ def _has_force(run: Run, joint: Joint) -> bool:
 def _values(run: Run, joint: Joint) -> Floats:
     """Moment, force and arm by frame (3, f).
 
-    The arm of a muscle that is a line between two bones, around obstacles on these too, is ``-dl/dtheta``; that of any other, by
-    virtual work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
+    For a muscle that is a line between two bones, or around obstacles on these bones, the arm is ``-dl/dtheta``. For any other
+    muscle it is, by virtual work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
     """
     moment = run.moment(joint.bone.name, joint.centre) @ joint.axis
     force = np.linalg.norm(run.force(joint.bone.name), axis=1)

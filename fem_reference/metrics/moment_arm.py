@@ -23,8 +23,8 @@ STATISTICS = {
     ),
     "rms": Statistic("mm", _TITLE, "rms", shown={"solvers": 35, "rank": 40}, local=True),
     "max": Statistic("mm", _TITLE, "worst fibre", shown={"table": 35}, local=True, lone=True),
-    "least": Statistic("mm", _TITLE, "least of a fibre", local=True, lone=True),
-    "greatest": Statistic("mm", _TITLE, "greatest of a fibre", local=True, lone=True),
+    "least": Statistic("mm", _TITLE, "least over the fibres", local=True, lone=True),
+    "greatest": Statistic("mm", _TITLE, "greatest over the fibres", local=True, lone=True),
 }
 OF, AGAINST = "lines", "reference"
 # Angles [rad], and entries of pose matrices, count as equal if they differ by no more than this.

@@ -1,4 +1,4 @@
-"""Depth of a run's muscle inside the other muscles of the same run; of the run alone, independent of the reference."""
+"""Depth of a run's muscle inside the other muscles of the same run, independent of the reference."""
 
 from functools import lru_cache
 
@@ -15,7 +15,7 @@ STATISTICS = {
         "In muscles",
         "deepest",
         headline="{} deep in another muscle",
-        curve="Depth to which the muscle and another one penetrate each other",
+        curve="Depth to which the muscle and another muscle penetrate each other",
         shown={"curve": 52, "headline": 60},
     )
 }
@@ -38,7 +38,7 @@ def _measured(run: Run) -> tuple[Measure, ...]:
         for i, number in enumerate(run.numbers):
             one, two = run.positions[i], other.positions[other.numbers.index(number)]
             if not (np.isfinite(one).all() and np.isfinite(two).all()):
-                values[i], where[i] = np.nan, f"not known of {name}"
+                values[i], where[i] = np.nan, f"unknown surface of {name}"
                 continue
             depth, place = penetration(run.surface.moved_to(one), other.surface.moved_to(two))
             if depth > values[i]:

@@ -1,6 +1,6 @@
-"""Depth and volume of a run's muscle inside the bones; of the run alone, independent of the reference.
+"""Depth and volume of a run's muscle inside the bones, independent of the reference.
 
-The distance field is the field used for contact. Where contact is exempt, only depth in excess of the depth at rest counts.
+The distance field is the field used for contact. Where contact is exempt, only the depth added since rest counts.
 """
 
 import logging
@@ -25,14 +25,14 @@ STATISTICS = {
         "mm",
         "In bones",
         "deepest",
-        curve="Depth of the muscle inside a bone, near attachments beyond that at rest",
+        curve="Depth of the muscle inside a bone (near attachments, the depth added since rest)",
         shown={"table": 80, "curve": 50, "solvers": 70, "scenes": 40},
     ),
     "volume": Statistic("mm3", curve="Volume inside bones, without attached parts", shown={"curve": 60}),
 }
 OF, AGAINST = "surface", "itself"
 
-# A triangle is small enough to follow a bone with edges up to this many times the reach of ``Exemption``.
+# A triangle is small enough to follow a bone if its edges are at most this many times the reach of ``Exemption``.
 _FOLLOWS = 4.0
 # A point deeper than this share of half the thickness is in the middle of a bone, and may leave the bone on the other side.
 _MIDDLE = 0.75
@@ -54,14 +54,14 @@ def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Mea
 
     Depth is measured at the vertices of the surface, and between vertices in triangles that do not follow the bone. If the interior
     of the muscle reaches the middle of the bone, the depth of the interior counts. Near an attachment only depth added since rest
-    counts. The same holds for an attachment inside a foreign bone that moves differently; inside its own bone depth is not checked.
+    counts. The same holds for an attachment inside another bone that moves differently; inside its own bone depth is not checked.
     A triangle follows a bone if all its corners are within the reach of ``Exemption`` and its edges are shorter than four times
-    that reach: any greater depth between them is the part of a round bone that a flat triangle cuts off.
+    that reach. Any greater depth between the corners is the part of a round bone that a flat triangle cuts off.
 
-    Depth is as exact as the field of the bone (``Grid.mean_error``, with rounding). Volume is counted at random points, see
-    ``shared``. On the muscles of a hip, 12 volumes from 5 to 24 000 mm3 differed by less than 1 % from a count with fifty times the
-    points, smaller volumes by less than 6 %. NaN in a frame whose surface encloses no finite volume, and in all frames if a bone is
-    not closed and so has no inside.
+    The depth is as accurate as the field of the bone (``Grid.mean_error``, with rounding). The volume is estimated from random
+    points (``shared``). On the muscles of a hip, 12 volumes from 5 to 24 000 mm3 differed by less than 1 % from an estimate with
+    fifty times the points, and smaller volumes by less than 6 %. Values are NaN in a frame whose surface encloses no finite volume,
+    and in all frames if a bone is not closed and so has no inside.
     """
     return _measured(run, context)
 
@@ -119,8 +119,8 @@ def _deepest(exempt: Exemption, fine: Surface, bone: str, gaps: Floats, allowed:
 
 
 def _allowed(exempt: Exemption, bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> dict[str, Floats]:
-    """The allowed depth [mm] at the corners (k,) of the pieces of a surface, by bone: 0 where contact acts, the depth at rest near
-    attachments, and any depth on attachments to this bone or to a bone that moves in the same way at all frame ``numbers``.
+    """The allowed depth [mm] at the corners (k,) of the pieces of a surface, by bone. It is 0 where contact acts, the depth at rest
+    near attachments, and infinite on attachments to this bone or to a bone that moves in the same way at all frame ``numbers``.
     """
     near, on = exempt.corners.away <= exempt.reach, exempt.corners.away == 0
     rest = exempt.corners.carried @ exempt.surface.points
@@ -140,7 +140,7 @@ def _alike(bone: Bone, name: str, bones: tuple[Bone, ...], numbers: tuple[int, .
 
 
 def _without_inside(bones: tuple[Bone, ...]) -> str:
-    """The bone that has no inside, and the reason; nothing if every bone has an inside."""
+    """The bone that has no inside, and the reason; an empty text if every bone has an inside."""
     for bone in bones:
         try:
             _ = bone.shape

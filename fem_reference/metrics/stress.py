@@ -15,17 +15,17 @@ STATISTICS = {
     "along_fibres_mean": _of_field(
         "along fibres, mean", curve="Stress along the fibres, mean over the volume", shown={"curve": 32}
     ),
-    "along_fibres_p95": _of_field("along fibres, 95 % below"),
+    "along_fibres_p95": _of_field("along fibres, 95th percentile"),
     "von_mises_mean": _of_field("von Mises, mean"),
     "von_mises_p95": _of_field(
-        "von Mises, 95 % below", curve="Von Mises stress, which 95 % of the volume do not exceed", shown={"curve": 33}
+        "von Mises, 95th percentile", curve="Von Mises stress, 95th percentile over the volume", shown={"curve": 33}
     ),
     "pressure_mean": _of_field("pressure, mean", curve="Pressure, mean over the volume", shown={"curve": 34}),
-    "pressure_p05": _of_field("pressure, 5 % below"),
-    "pressure_p95": _of_field("pressure, 95 % below"),
+    "pressure_p05": _of_field("pressure, 5th percentile"),
+    "pressure_p95": _of_field("pressure, 95th percentile"),
 }
 OF, AGAINST = "surface", "reference"
-_KILO = 1000.0  # kPa in a MPa
+_KILO = 1000.0  # kPa per MPa
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:  # noqa: ARG001

@@ -18,7 +18,7 @@ STATISTICS = {
         headline="surface off by up to {} rms",
         shown={"main": 30, "table": 40, "headline": 10, "solvers": 40, "rank": 10, "claim": 10},
     ),
-    "p95": Statistic("mm", _TITLE, "95 % below", shown={"table": 50, "claim": 20}),
+    "p95": Statistic("mm", _TITLE, "95th percentile", shown={"table": 50, "claim": 20}),
     "max": Statistic("mm", _TITLE, "worst vertex", shown={"main": 40, "table": 60, "claim": 30}, local=True),
     "distance_mean": Statistic("mm"),
     "distance_rms": Statistic("mm"),
@@ -38,7 +38,7 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
     """Material: ``rms``, ``p95`` (area-weighted 95th percentile) and ``max`` of the distance between corresponding vertices [mm].
 
     Geometric: ``distance_mean``, ``distance_rms`` and ``hausdorff`` [mm] of the distances from the vertices of each surface to the
-    closest point of the other surface. Only vertices are sampled, so ``hausdorff`` is a lower bound of the Hausdorff distance. Each
+    closest point of the other surface. Only vertices are sampled, so ``hausdorff`` is a lower bound on the Hausdorff distance. Each
     statistic is also given as ``..._percent`` of the reference's greatest displacement.
     """
     material = np.linalg.norm(run.positions - reference.positions, axis=2)
@@ -73,7 +73,7 @@ def _both_directions(run: Run, reference: Run, frame: int) -> Floats:
 
 
 def _percent(values: Floats, travel: float) -> Floats:
-    """``values`` (f,) [mm] in per cent of ``travel`` [mm]; for a travel of 0, values of 0 give 0 and all others infinity."""
+    """``values`` (f,) [mm] in per cent of ``travel`` [mm]; for a travel of 0, values of 0 give 0 and all others give infinity."""
     if travel == 0:
         return np.where(values == 0, 0.0, values + np.inf)
     return np.asarray(100 * values / travel)

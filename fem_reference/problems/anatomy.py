@@ -75,9 +75,9 @@ def tendon_of(case: MuscleCase, i: int) -> Floats | None:
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
-    """The boundary triangles (m, 3) of a ``mesh`` inside a ``surface``, outward, under the attached part of the surface, whose rim
-    they do not follow: their attached share, averaged over seven samples, is above a half. ``shares`` (k, 3): the attached shares
-    of the corners of each triangle of ``surface``.
+    """The outward boundary triangles (m, 3) of a ``mesh`` in a ``surface`` that count as attached, for a mesh that does not follow
+    the rim. Their attached share, averaged over seven samples, is above 1/2. ``shares`` (k, 3): the attached shares of the corners
+    of each triangle of ``surface``.
     """
     triangles, _ = boundary(mesh.tets)
     samples = np.einsum("qk,mkd->mqd", _SAMPLES, mesh.points[triangles]).reshape(-1, 3)
@@ -132,13 +132,13 @@ def _patches(path: Path, outline: Outline, place: str) -> Surface:
 
 def draped(patches: Surface, bone_surface: Surface) -> Surface:
     """The patches draped on the bone: triangles with sides of at most 2 mm, whose corners are moved to the nearest points of the
-    bone. Landmarks lie on the bone, but triangles between them need not: over the hollow of the iliac fossa they are 13 mm off the
-    bone, more than the thickness of the muscle.
+    bone. Landmarks lie on the bone, but triangles between them need not. Over the hollow of the iliac fossa they are 13 mm off the
+    bone, which is more than the thickness of the muscle.
     """
     longest = _longest_side(patches)
     if len(patches.triangles) * (longest / _SIDE) ** 2 > _MOST_TRIANGLES:
         got = f"landmarks {longest:.4g} mm apart"
-        raise InputError(patches.place, got, "those around one attachment, in the unit stated")
+        raise InputError(patches.place, got, "landmarks around one attachment, in the stated unit")
     while _longest_side(patches) > _SIDE:
         patches = resampled(patches, 1)
     return patches.moved_to(distances(patches.points, bone_surface).closest)

@@ -42,8 +42,8 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 def is_stabilised(element: str) -> bool:
     """True for an element with displacement and pressure of the same degree: its pressure would oscillate without stabilisation.
 
-    The added energy is ``-1 / (4 mu) integral of (p - its mean in the cell)^2``, with the cell's shear modulus mu at rest: the mean
-    of the second derivatives of the energy with respect to F_ij, i != j. This energy decreases with the square of the cell size.
+    The added energy is ``-1 / (4 mu) integral of (p - its mean in the cell)^2``. The cell's shear modulus mu at rest is the mean of
+    the second derivatives of the energy with respect to F_ij, i != j. This energy decreases with the square of the cell size.
 
     Source: Dohrmann and Bochev 2004, doi 10.1002/fld.752; with 2 mu as in White and Borja 2008, doi 10.1016/j.cma.2008.05.015.
     """
@@ -69,8 +69,8 @@ def facet_corners(kind: Kind) -> list[tuple[int, ...]]:
 
 
 def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, ...], place: str) -> None:
-    """Raise an InputError that names ``place`` unless an ``element``, a key of ``ELEMENTS``, suits cells and effects: its
-    displacement has the ``degree`` of the cells or a higher one, and it has a pressure if and only if an effect needs a pressure.
+    """Raise an InputError that names ``place`` unless an ``element``, a key of ``ELEMENTS``, suits cells and effects. Its
+    displacement must have at least the ``degree`` of the cells, and it must have a pressure if and only if an effect needs one.
     """
     if element not in ELEMENTS:
         raise InputError(place, f'"{element}"', f"one of {', '.join(ELEMENTS)}")
@@ -83,7 +83,7 @@ def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, 
     if element not in fitting:
         cells = f"{'curved ' if degree > 1 else ''}{kind} cells"
         pressure = "with a pressure, which an effect brings" if brings else "without a pressure, which no effect brings"
-        raise InputError(place, f'"{element}"', f"one for {cells} {pressure}: {', '.join(fitting)}")
+        raise InputError(place, f'"{element}"', f"an element for {cells} {pressure}: {', '.join(fitting)}")
 
 
 def check_stiffness(effects: tuple[Effect, ...], place: str) -> None:

@@ -26,18 +26,16 @@ from fem_reference.problems.touching import Touching, check_touching
 
 SAME = 1e-6  # share of the body's size by which two prescriptions of one displacement may differ
 _FLAT = 1e-9  # a cell counts as flat below this share of its longest edge cubed
-_FARTHEST = 1e9  # [mm] from the origin
-_MOST = 100_000  # frames
-_MOST_CELLS = 10_000_000  # cells of a box
+_FARTHEST = 1e9  # the greatest distance [mm] of a point from the origin
+_MOST = 100_000  # the largest number of frames
+_MOST_CELLS = 10_000_000  # the largest number of cells of a box
 _SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each other
-_THINNEST = (
-    1e6  # length over thickness of a cell: stiffnesses differ by the square of this ratio, too much for 16 digits
-)
+_THINNEST = 1e6  # length over thickness of a cell: stiffnesses differ by the square of this ratio, too much for doubles
 
 
 def check(body: Body, element: str, quadrature_degree: int | None = None) -> None:
-    """Raise InputError unless ``body`` is valid, ``element`` suits its cells and effects, all required regions and fibre directions
-    exist, its constraints agree and can be followed and solved, and ``quadrature_degree`` suits the element.
+    """Raise InputError unless ``body`` is valid, and ``element`` and ``quadrature_degree`` suit its cells and effects. All required
+    regions and fibre directions must exist, and all constraints must agree and be such that a solver can follow them.
     """
     if not isinstance(body, Body):
         raise InputError("body", said(body), "a Body")
@@ -66,9 +64,9 @@ def check(body: Body, element: str, quadrature_degree: int | None = None) -> Non
 def check_box(counts: object, size: object, kind: object, degree: object) -> None:
     """Raise InputError unless the numbers of cells, the lengths, the kind of cell and the degree of a box are valid."""
     if not isinstance(counts, tuple | list) or len(counts) != 3 or not all(_is_integer(n) and n > 0 for n in counts):
-        raise InputError("counts", said(counts), "numbers of cells along x, y, z, from 1 on")
+        raise InputError("counts", said(counts), "numbers of cells along x, y, z, at least 1")
     if int(counts[0]) * int(counts[1]) * int(counts[2]) > _MOST_CELLS:
-        raise InputError("counts", said(counts), f"{_MOST_CELLS} cells at most")
+        raise InputError("counts", said(counts), f"at most {_MOST_CELLS} cells")
     if (
         not isinstance(size, tuple | list | np.ndarray)
         or getattr(size, "ndim", 1) != 1
@@ -77,7 +75,7 @@ def check_box(counts: object, size: object, kind: object, degree: object) -> Non
     ):
         raise InputError("size", said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
     if not max(size) < _LONGEST * min(size):
-        raise InputError("size", said(size), f"an edge less than {_LONGEST:g} times as long as another")
+        raise InputError("size", said(size), f"edges less than {_LONGEST:g} times as long as each other")
     _check_kind("", kind, degree)
 
 
@@ -98,9 +96,9 @@ def check_frames(frames: object, place: str) -> None:
     ):
         raise InputError(place, said(frames), "frame numbers, at least one")
     if not all(early < late for early, late in pairwise(frames)):
-        raise InputError(place, said(frames), "frame numbers that are each later than the one before")
+        raise InputError(place, said(frames), "increasing frame numbers")
     if len(frames) > _MOST:
-        raise InputError(place, f"{len(frames)} of them", f"{_MOST} at most")
+        raise InputError(place, f"{len(frames)} frame numbers", f"at most {_MOST}")
 
 
 def _is_number(value: Any) -> bool:
@@ -129,8 +127,8 @@ def _check_rest(body: Body) -> None:
         part = getattr(body, name)
         if part is not None and not callable(part):
             raise InputError(name, said(part), "a function, or None")
-    _check_many("bones", body.bones, ContactBone, "bones that may press")
-    _check_many("touching", body.touching, Touching, "parts of the surface that may touch")
+    _check_many("bones", body.bones, ContactBone, "bones")
+    _check_many("touching", body.touching, Touching, "pairs of parts that may touch")
     if body.start is not None:
         begun = np.asarray(body.start(np.array(body.mesh.points)))
         if begun.shape != body.mesh.points.shape or not np.isfinite(begun).all():
@@ -148,7 +146,9 @@ def _check_cells(mesh: Any) -> None:
     if not isinstance(points, np.ndarray) or points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f":
         raise InputError("mesh.points", said(points), "an array (n, 3) of floats")
     if not (np.abs(points) <= _FARTHEST).all():
-        raise InputError("mesh.points", "a point that is not finite, or too far away", f"up to {_FARTHEST:g} mm away")
+        raise InputError(
+            "mesh.points", "a point that is not finite, or too far away", f"points within {_FARTHEST:g} mm"
+        )
     nodes = len(reference_nodes(mesh.kind, mesh.degree))
     _check_indices("mesh.cells", mesh.cells, nodes, len(points))
     if not len(mesh.cells):
@@ -183,9 +183,9 @@ def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
     for entry in prescribed:
         place = f"prescribed.{entry.name}"
         if not isinstance(entry.name, str) or not isinstance(entry.on, str | Skin):
-            raise InputError(f"{place}: name and on", f"{said(entry.name)}, {said(entry.on)}", "a text, and a region")
+            raise InputError(f"{place}: name and on", f"{said(entry.name)}, {said(entry.on)}", "a text and a region")
         if names.count(entry.name) > 1:
-            raise InputError("prescribed", f'"{entry.name}" twice', "a name for each")
+            raise InputError("prescribed", f'"{entry.name}" twice', "a different name for each")
         axes = isinstance(entry.components, tuple | list) and len(entry.components) > 0
         axes = axes and all(_is_integer(one) and 0 <= one <= 2 for one in entry.components)
         if not axes or len(set(entry.components)) < len(entry.components):
@@ -196,7 +196,7 @@ def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
         if entry.stiffness is None and not isinstance(entry.on, str):
             raise InputError(f"{place}.stiffness", "none on a skin", "springs")
         if entry.stiffness is not None and not (_is_number(entry.stiffness) and entry.stiffness > 0):
-            raise InputError(f"{place}.stiffness", f"{entry.stiffness}", "more than 0, or None: exact")
+            raise InputError(f"{place}.stiffness", f"{entry.stiffness}", "a stiffness above 0, or None if exact")
         if entry.anchor is not None and (isinstance(entry.on, str) or len(entry.components) < 3):
             raise InputError(
                 f"{place}.anchor", said(entry.anchor), "None, or springs at points of a skin along all axes"
@@ -213,7 +213,7 @@ def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
             raise InputError(f"facets.{name}", "none", "facets of one cell each")
         if lost:
             some = f"{len(lost)} of {len(facets)}, the first with corners {lost[0]}"
-            got = f"facets that are not of one cell each ({some})"
+            got = f"facets that do not belong to one cell each ({some})"
             raise InputError(f"facets.{name}", got, "facets on the boundary of the cells")
 
 
@@ -231,9 +231,9 @@ def _check_needs(body: Body) -> None:
 
 
 def check_agreement(body: Body) -> None:
-    """Raise InputError if a part of the body lacks a law (``regions.check``), the normal of a law is along fibres, a tendon or
-    friction is combined with tension at rest, a load acts along prescribed axes alone, two regions of its surface prescribe
-    different exact displacements at shared places, or a path of motion cannot be followed. Displacements are compared at all
+    """Raise InputError if a part of the body lacks a law (``regions.check``), the normal of a law is along fibres, or a tendon or
+    friction is combined with tension at rest. Raise InputError also if a load acts along prescribed axes alone, two regions
+    prescribe different exact displacements at shared places, or a path cannot be followed. Displacements are compared at all
     frames, at all stops, and halfway between them.
     """
     regions.check(body)
@@ -263,11 +263,11 @@ def _check_start(body: Body) -> None:
         if not off <= SAME * body.size:
             place = f'prescribed "{entry.name}": path at frame {body.frames[0]:g}'
             got = f"displacements up to {off:.4g} mm"
-            raise InputError(place, got, "none at the first frame: the body begins at rest")
+            raise InputError(place, got, "none at the first frame, where the body is at rest")
 
 
 def _shared(mesh: Cells, one: str, other: str) -> Floats:
-    """The corners, and the middles of edges, that two regions share (n, 3) [mm]."""
+    """The corners and midpoints of edges (n, 3) [mm] that two regions share."""
     count = len(mesh.points)
 
     def edges(name: str) -> Ints:

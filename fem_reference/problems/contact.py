@@ -15,7 +15,7 @@ from fem_reference.geometry.skins import Skin
 
 # The largest share of the unattached surface that may be exempt from contact; above half of this share there is a warning.
 _LOST = 0.5
-# The least half thickness of a bone, in spacings of contact points: a thinner bone passes between four points, each 0.71 away.
+# The least half thickness of a bone, in spacings of contact points: a thinner bone passes between four points, 0.71 spacings away.
 _THINNEST = 0.75
 # Above this share of half a bone's thickness, the direction in which to remove an overlap at rest is not defined.
 _MIDDLE = 0.95
@@ -61,11 +61,11 @@ class ContactLaw:
     parts: tuple[tuple[str, int, int], ...] = ()
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative in the gap [MPa/mm]; NaN if the gap is NaN."""
+        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative with respect to the gap [MPa/mm]; NaN if the gap is NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
 
     def gap(self, pressure: Floats) -> Floats:
-        """The gap (n,) [mm] of pressures (n,) [MPa] from 0 on."""
+        """The gap (n,) [mm] at pressures (n,) [MPa], which are 0 or more."""
         k, d = self.stiffness, self.smoothing
         return np.where(pressure > k * d, -pressure / k, d - 2 * np.sqrt(d * pressure / k))
 
@@ -77,7 +77,7 @@ class ContactLaw:
 
 
 def remaining(relaxed: tuple[float, float], frame: float) -> float:
-    """The share of an overlap at rest that is left at ``frame``, with a removal between two frame numbers."""
+    """The share of an overlap at rest that is left at ``frame`` if it is removed between two frame numbers."""
     first, last = relaxed
     return float(np.clip((last - frame) / (last - first), 0, 1))
 
@@ -112,7 +112,7 @@ def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
     nearest, half = float(bone.sample(points).distance.min(initial=np.inf)), bone.half_thickness
     if nearest < -_MIDDLE * half:
         got = f"{-nearest:.3g} mm of overlap with the muscle at rest"
-        want = f"less: its middle is {half:.3g} mm deep, and no side is nearer than another there"
+        want = f"less overlap: in the middle of the bone, {half:.3g} mm deep, no side is nearest"
         raise InputError(f'bone "{name}"', got, want)
     return nearest
 
@@ -120,9 +120,9 @@ def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
 def check_bone(place: str, surface: Surface, shape: Obstacle, muscle: Surface, apart: float) -> None:
     """Raise InputError for a bone inside the muscle, which no force would move out, or too thin for points ``apart``."""
     if signed_distances(surface.points, muscle).max() < 0:
-        raise InputError(place, "a bone wholly inside the muscle", "one that is not")
+        raise InputError(place, "a bone entirely inside the muscle", "a bone that is partly outside")
     if not shape.half_thickness >= _THINNEST * apart:
-        want = f"{2 * _THINNEST * apart:.2g} mm or more, as points of contact are {apart:.2g} mm apart"
+        want = f"{2 * _THINNEST * apart:.2g} mm or more, as contact points are {apart:.2g} mm apart"
         raise InputError(place, f"a bone {2 * shape.half_thickness:.2g} mm thick", want)
 
 
@@ -130,6 +130,6 @@ def check_exempt(exempt: Exemption, place: str) -> None:
     """Raise InputError if most of the unattached surface is exempt from contact; log a warning if much of it is exempt."""
     got = f"attachments within {exempt.reach:.2g} mm of {100 * exempt.lost:.0f} % of the unattached surface, without contact there"
     if not exempt.lost <= _LOST:
-        raise InputError(place, got, f"at most {100 * _LOST:.0f} %: larger or fewer pieces, or no effect contact")
+        raise InputError(place, got, f"at most {100 * _LOST:.0f} %: larger or fewer attachments, or no contact effect")
     if exempt.lost > _LOST / 2:
         log.warning("%s: %s", place, got)

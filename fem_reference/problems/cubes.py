@@ -70,6 +70,6 @@ def loaded(acting: Sequence[Effect], stretches: Sequence[float | None], fibre: F
     P = nominal_stress(acting, F, fibre)
     if not np.abs(left(found)).max() <= _LEFT * np.abs(P).max() + _ROUNDING * moduli(acting).bulk:
         raise ArithmeticError(
-            f"no homogeneous state at stretches {stretches}: {np.abs(left(found)).max():.1e} MPa left"
+            f"no homogeneous state at stretches {stretches}: {np.abs(left(found)).max():.1e} MPa of residual stress"
         )
     return CubeState(F, P)

@@ -11,7 +11,7 @@ from fem_reference.geometry.fibres import Directions
 from fem_reference.problems.body import Body
 
 _UNIT = 1e-6  # the tolerance on the length of a unit vector
-_LEAST = 1.0  # the least angle [deg] between a normal and the fibres, which are not exact in a mesh
+_LEAST = 1.0  # the least angle [deg] between a normal and the fibres, whose directions are not exact in a mesh
 
 
 def check_unit(fibre: Directions, places: Floats) -> None:
@@ -22,7 +22,7 @@ def check_unit(fibre: Directions, places: Floats) -> None:
     except Exception as error:  # any error in a function of the caller
         raise InputError("fibre", f"{type(error).__name__}: {error}", "directions (n, 3) at points (n, 3)") from error
     if found.shape != (len(cells), 3):
-        raise InputError("fibre", f"directions {found.shape} at points {(len(cells), 3)}", "one (3,) at each")
+        raise InputError("fibre", f"directions {found.shape} at points {(len(cells), 3)}", "one direction (3,) at each")
     lengths = np.linalg.norm(found, axis=1)
     worst = int(np.argmax(np.where(np.isfinite(lengths), np.abs(lengths - 1), np.inf)))
     if not abs(lengths[worst] - 1) <= _UNIT:
@@ -30,7 +30,7 @@ def check_unit(fibre: Directions, places: Floats) -> None:
 
 
 def check_normals(body: Body) -> None:
-    """Raise InputError if the ``normal`` of a law is along the fibres, so that no direction across both is known."""
+    """Raise InputError if the ``normal`` of a law is along the fibres, so that no direction across both is defined."""
     laws = [effect for effect in body.effects if isinstance(effect, HolzapfelOgden)]
     fibre = body.fibre
     if fibre is None or not laws:
@@ -42,4 +42,4 @@ def check_normals(body: Body) -> None:
             worst = int(np.argmin(across))
             if not across[worst] >= math.sin(math.radians(_LEAST)):
                 got = f"a direction {math.degrees(across[worst]):.2g} deg from the fibre at {place_of(places[worst])}"
-                raise InputError(f"effect {law.title}.normal", got, f"{_LEAST:g} deg at least, and 30 deg better")
+                raise InputError(f"effect {law.title}.normal", got, f"at least {_LEAST:g} deg, preferably 30 deg")

@@ -18,8 +18,8 @@ from fem_reference.problems.setup import Bone, Setup
 from fem_reference.scenes.muscle import MuscleCase
 
 # An effect that moves the surface less than this is negligible: a share of the size of the scene's tetrahedra, or of the travel of
-# the surface if that is less. Error bars of the surface (rms) are 0.03 to 0.14 of the size and 0.01 to 0.05 of the travel; bars of
-# fibre lengths and volumes are smaller if only these change.
+# the surface if that is less. Error bars of the surface (rms) are 0.03 to 0.14 of the size and 0.01 to 0.05 of the travel; error
+# bars of fibre lengths and volumes are smaller if only these change.
 TOLERANCE = 0.005
 # The negligible change of stress by an effect, relative to the stress of the others, and the least strain assumed for it.
 STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
@@ -27,15 +27,15 @@ STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
 _DOUBT = 1.0
 # The numbers of sampled frames, evenly spread, and of sampled vertices.
 _FRAMES, _VERTICES = 9, 1500
-_PLACES = 6000  # contact points, sampled for their distance to bones
+_PLACES = 6000  # the number of contact points sampled for their distance to bones
 _ALONG = 0.7  # triangles are sampled for the stretch along a direction if its share in their plane is above this
-_STILL = 1e-6  # [mm], motion that is only rounding
-_FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
+_STILL = 1e-6  # motion [mm] that is only round-off
+_FELT = 1.0  # a distance [mm] from a bone that exceeds any smoothing of contact
 
 
 @dataclass(frozen=True)
 class Decision:
-    """Decision on whether an effect is ``needed``, by its ``indicator`` (None for a part of the material) and the allowed values
+    """The decision whether an effect is ``needed``, by its ``indicator`` (None for a part of the material) and the allowed values
     ``bound`` [mm] and ``stress_bound`` [MPa]. ``turned_out``: the frame whose solution showed the need, None if estimates showed
     it. ``listed``: the effect acts in any case. ``of``: the muscle in which it acts, if there are several.
     """
@@ -59,7 +59,7 @@ class Decision:
         """The decision in words."""
         if self.indicator is None:
             pressing = isinstance(self.effect, Interaction)
-            return "kept, as no estimate shows what touches" if pressing else "kept, part of the material"
+            return "kept, as no estimate shows what touches" if pressing else "kept, as part of the material"
         return f"{self._word}, about {self._because}; {self.indicator.rule}: {self.indicator.number:.2g}"
 
     def __str__(self) -> str:
@@ -72,9 +72,9 @@ class Decision:
         if not self.needed:
             return "left out"
         if self.turned_out is not None:
-            return f"needed as it turned out at frame {self.turned_out}"
+            return f"found to be needed at frame {self.turned_out}"
         pressing = isinstance(self.effect, Interaction)
-        return "watched, and in the equations where something is pressed" if pressing else "needed"
+        return "watched, and in the equations where a surface is pressed" if pressing else "needed"
 
     @property
     def _because(self) -> str:
@@ -219,7 +219,7 @@ def stretched(rest: Setup, positions: Floats) -> tuple[float, float]:
 
 
 def _near(bone: Bone, points: Floats, moved: Mapping[int, Floats] | Mapping[float, Floats], doubt: float) -> Near:
-    """The gap of ``moved`` ``points`` (n, 3) to a ``bone``; ``doubt``: its greatest error, as a share of their path past it."""
+    """The gap of ``moved`` ``points`` (n, 3) to a ``bone``; ``doubt``: its greatest error, as a share of the path past it."""
     low, high = bone.surface.points.min(axis=0), bone.surface.points.max(axis=0)
     local = np.stack([apply(np.linalg.inv(bone.pose(frame)), at) for frame, at in moved.items()])
     off = doubt * np.linalg.norm(local - points, axis=2)

@@ -1,4 +1,4 @@
-"""The ends of a muscle's fibres: the attachment to which each belongs, its distance from it, and the area that ends cover."""
+"""The ends of a muscle's fibres: the attachment of each end, its distance from it, and the attached area that the ends cover."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +14,7 @@ from fem_reference.problems.setup import AttachedVertices
 
 # The greatest distance [mm] at which an end counts as reaching its attachment: the muscle there practically moves with the bone.
 REACHES = 2.0
-SIDES = ("first", "last")  # ends of a fibre
+SIDES = ("first", "last")  # the ends of a fibre
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +102,8 @@ def facts_of(lines: Polylines, ends: FibreEnds | None) -> dict[str, float | str]
 def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fibres: Polylines) -> FibreEnds | None:
     """The ends of the ``fibres`` of a muscle from its attachments and their parts exempt from contact; None without attachments.
 
-    A fibre runs from bone to bone: among the pairs of attachments to two bones, its ends belong to the pair with the least sum of
-    distances, so a short fibre beside its origin does not belong to the origin twice. If one bone has all attachments, each end
+    A fibre runs from bone to bone: its ends belong to the pair of attachments to two bones with the least sum of distances. So the
+    two ends of a short fibre beside its origin do not both belong to the origin. If all attachments are to one bone, each end
     belongs to the nearest attachment.
     """
     if not attached:
@@ -124,7 +124,7 @@ def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fib
 
 
 def completed(lines: Polylines, ends: FibreEnds) -> Polylines:
-    """The ``lines``; lines that end beside their attachment are extended straight to its closest point in steps of at most 2 mm.
+    """The ``lines``, with lines that end beside their attachment extended to its closest point in straight steps of at most 2 mm.
 
     An extension may leave the muscle; the caller moves its points back inside.
     """

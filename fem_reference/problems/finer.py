@@ -29,7 +29,7 @@ class OfParts:
 
 def finer(body: Body) -> tuple[Body, Ints]:
     """The ``body`` with each cell cut into eight, and the number (n,) in the new body of each point of ``body``, -1 for a point of
-    no cell. The shape of the coarser cells remains: no surface gets smoother.
+    no cell. The shape of the coarser cells remains: no surface becomes smoother.
     """
     mesh, shared = _cut(body.mesh)
 

@@ -1,4 +1,4 @@
-"""Coulomb's friction of points on a surface: a spring holds a point, which slides if the force would exceed the limit."""
+"""Coulomb friction of points on a surface: a spring keeps a point in place until its force exceeds the limit; then it slides."""
 
 from collections.abc import Iterable
 from math import isfinite
@@ -12,18 +12,18 @@ from fem_reference.foundations.mesh import Floats
 
 def check(coefficients: Iterable[float | None], *, begun: bool) -> None:
     """Raise InputError if a coefficient of friction is neither None nor above 0, or if a body with friction has ``begun`` deformed
-    or under tension: the places to which its points stick are then not known.
+    or under tension. The places to which its points stick are then not known.
     """
     for one in (one for one in coefficients if one is not None):
         if not (isfinite(one) and one > 0):
             raise InputError("friction", one, "a number above 0, or None without friction")
         if begun:
-            raise InputError("friction", one, "none in a body that does not start at rest, without tension")
+            raise InputError("friction", one, "no friction in a body that starts deformed or under tension")
 
 
 class Returned(NamedTuple):
-    """Traction of n points over their elastic slip, ``stiffness`` (n,) [MPa/mm], with its derivatives with respect to the length of
-    the elastic slip, ``by_slip`` (n,), and the limit of the traction, ``by_limit`` (n,).
+    """The traction of n points divided by their elastic slip, ``stiffness`` (n,) [MPa/mm], and its derivatives with respect to the
+    length of the elastic slip, ``by_slip`` (n,), and to the limit of the traction, ``by_limit`` (n,).
     """
 
     stiffness: Floats
@@ -45,7 +45,7 @@ def returned(slip: Floats, limit: Floats, stiffness: float) -> Returned:
 
 
 def since_entry(gap: Floats, before: Floats, felt: float) -> tuple[Floats, Floats]:
-    """The share (n,) of a straight path that lies within contact, and the derivative (n,) of this share in ``gap``. The gap
+    """The share (n,) of a straight path that lies within contact, and its derivative (n,) with respect to ``gap``. The gap
     decreases from ``before`` (n,) [mm], at least ``felt`` [mm], to ``gap`` (n,) [mm], below ``felt``.
     """
     whole = before - gap

@@ -14,9 +14,9 @@ from fem_reference.problems.setup import Bone, Setup
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """A guess of the path of ``points`` (n, 3), which follow ``bones`` with ``weights`` (n, b): the inverse distances to the
-    attachments of each bone, so the muscle between two attachments stays straight, as under tension; or, if nothing is attached,
-    the inverse distances to the bones.
+    """A guess of the path of ``points`` (n, 3), which follow ``bones`` with ``weights`` (n, b). The weights are the inverse
+    distances to the attachments of each bone, so the muscle between two attachments stays straight, as under tension. If nothing
+    is attached, the weights are the inverse distances to the bones.
     """
 
     points: Floats
@@ -47,7 +47,7 @@ def distance(bone: Bone, points: Floats) -> Floats:
 
 def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float, float, float, float]:
     """The greatest speed, speed perpendicular to an ``axis`` (3,), jump of velocity, and acceleration of a guess, per frame number;
-    each is a root mean square over its points. A jump is a change of velocity much greater than usual.
+    each is a root mean square over its points. A jump is a change of velocity much greater than at most frames.
     """
     some = slice(None, None, max(1, len(guess.points) // 100))
     guess = replace(guess, points=guess.points[some], weights=guess.weights[some])
@@ -110,8 +110,8 @@ def axis_of(rest: Setup) -> Floats:
 
 
 def sag(rest: Setup, frames: list[int], travel: float) -> float:
-    """The deviation [mm] of the axis from the straight line between two attachments: the sum of the deviation at rest in the middle
-    third, the deviation by turning bones, and a twentieth of the travel (a sideways shift bends the axis into two stiffer waves).
+    """The deviation [mm] of the axis from the straight line between two attachments. It is the sum of the deviation at rest in the
+    middle third, the deviation by turning bones, and 1/20 of the travel (a sideways shift bends the axis into two stiffer waves).
     """
     if len(rest.attached) < 2:
         return 0.0

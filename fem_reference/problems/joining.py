@@ -57,7 +57,7 @@ class DirectionsByPiece:
 
 @dataclass(frozen=True, eq=False)
 class Share:
-    """The share of points in a ``region``, or outside of it; 1 if no region is named."""
+    """The share of points in a ``region``, or outside it; 1 if no region is named."""
 
     region: Region | None = None
     outside: bool = False
@@ -71,7 +71,7 @@ class Share:
 
 def join(bodies: Mapping[str, Body], touching: tuple[Touching, ...] = ()) -> Body:
     """The body joined from ``bodies`` by name, with contact ``touching`` between facets of the joined body. Effects that all bodies
-    have act everywhere, other effects act in the cells of their bodies. InputError if bodies differ in shared properties.
+    have act everywhere; other effects act in the cells of their bodies. InputError if bodies differ in shared properties.
     """
     ends = np.cumsum([0, *(len(one.mesh.cells) for one in bodies.values())]).tolist()
     ranges = {name: (first, last) for name, first, last in zip(bodies, ends, ends[1:], strict=False)}
@@ -130,7 +130,7 @@ def _acting(
                 continue
             if not isinstance(effect, Energy) or "momentum" in effect.needs:
                 want = "the same values on all muscles"
-                raise InputError(f"{name}: {effect.title}", "an effect that has no region", want)
+                raise InputError(f"{name}: {effect.title}", "an effect without a region", want)
             region = region_of(effect)
             where = called(name, region) if region else name
             inner = body.regions[region.removeprefix(REST)] if region else None

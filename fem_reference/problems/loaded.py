@@ -1,4 +1,4 @@
-"""Loads on parts of the surface that are prescribed exactly: they would go to what prescribes them and deform nothing."""
+"""Checks of loads on exactly prescribed parts of the surface, where a load would deform nothing."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -12,7 +12,7 @@ from fem_reference.problems.body import Body, Prescribed
 
 
 def check(body: Body) -> None:
-    """Raise InputError where an external load acts only along axes along which its facets are prescribed exactly."""
+    """Raise InputError if an external load acts only along axes along which its facets are prescribed exactly."""
     for effect in body.effects:
         if not (isinstance(effect, Load) and effect.outer and effect.on in body.mesh.facets):
             continue
@@ -21,7 +21,7 @@ def check(body: Body) -> None:
         along = (effect.along(_normals(points, facets)) for points in _places(body))
         if not any((one & free).any() or not one.any() for one in along):
             got = "a part that is prescribed exactly along all axes of the load, which deforms nothing"
-            want = "one that is free along an axis of the load, or attached by springs"
+            want = "a part that is free along an axis of the load, or attached by springs"
             raise InputError(f'{type(effect).__name__} on "{effect.on}"', got, want)
 
 
@@ -59,7 +59,7 @@ def _names(facets: Ints) -> list[tuple[int, ...]]:
 
 
 def _normals(points: Floats, facets: Ints) -> Floats:
-    """The sizes (f, 3) of the components of the normals of ``facets`` (f, 3 or 4), the greatest of all their triangles."""
+    """The sizes (f, 3) of the components of the normals of ``facets`` (f, 3 or 4), the greatest over the triangles of each."""
     corners = [points[column] for column in facets.T]
     crosses = [np.abs(np.cross(b - a, c - a)) for a, b, c in combinations(corners, 3)]
     greatest = np.max(crosses, axis=0)

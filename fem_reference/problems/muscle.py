@@ -256,8 +256,8 @@ def solid(bone: CaseBone) -> Obstacle | None:
 
 
 def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:
-    """Mesher, size and quality of the mesh; and for each attachment its area on the surface and on the tets, and the number of its
-    vertices farther than ``far`` [mm] from attached facets: islands that the tets do not resolve.
+    """The mesher, size and quality of the mesh, and for each attachment its area on the surface and on the tets. The number of
+    attached vertices farther than ``far`` [mm] from attached facets shows islands that the tets do not resolve.
     """
     qualities = tet_qualities(mesh.points, mesh.tets)
     facts: dict[str, float | str] = {

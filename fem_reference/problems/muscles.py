@@ -120,7 +120,7 @@ class MusclesProblem:
 
     @property
     def muscle(self) -> MuscleProblem:
-        """InputError, as there is no single muscle."""
+        """Raise InputError, as there is no single muscle."""
         raise InputError("muscle", f"several ({', '.join(self.problems)})", "a case of one muscle")
 
     def write_meshes(self, folder: Path) -> None:
@@ -142,7 +142,7 @@ class MusclesProblem:
         return join(bodies, tuple(touching))
 
     def _near_at_rest(self, one: str, other: str) -> bool:
-        """True if the tetrahedra of two muscles overlap at rest, or are so near that they press each other."""
+        """True if the tetrahedra of two muscles overlap at rest, or are so close that they press against each other."""
         assert self.law is not None  # called with contact only
         skins = [skin_of(self.problems[name].mesh) for name in (one, other)]
         return _apart(*skins) < self.law.smoothing
@@ -186,7 +186,7 @@ def build(case: MusclesCase, rest: MusclesSetup) -> MusclesProblem:
 
 
 def _gaps(case: MusclesCase, muscles: Mapping[str, Setup], felt: float) -> dict[tuple[str, str], float]:
-    """A lower bound [mm] of the distance between each two muscles over all frames. It allows for bulging, the pressure of bones and
+    """A lower bound [mm] on the distance between each two muscles over all frames. It allows for bulging, the pressure of bones and
     loads, unless the motion of the bones alone may bring two muscles within ``felt`` [mm].
     """
     parts, found = dict(zip(muscles, case.parts, strict=True)), dict[tuple[str, str], float]()
@@ -198,8 +198,8 @@ def _gaps(case: MusclesCase, muscles: Mapping[str, Setup], felt: float) -> dict[
 
 
 def _beyond(case: MuscleCase, rest: Setup) -> float:
-    """The distance [mm] by which a muscle may deviate from the motion of its bones: it bulges as it shortens at constant volume,
-    bones in contact displace it by their penetration, and external loads move it by at most its length.
+    """The distance [mm] by which a muscle may deviate from the motion of its bones. A muscle bulges as it shortens at constant
+    volume, bones in contact displace it by their penetration, and external loads move it by at most its length.
     """
     if any(one.outer for one in case.effects):
         return length_of(rest)
@@ -210,10 +210,10 @@ def _beyond(case: MuscleCase, rest: Setup) -> float:
 
 
 def clearance(one: Setup, other: Setup) -> float:
-    """A lower bound [mm] of the distance, over all frames, between two muscles that only follow the bones: the distance at rest
-    less the greatest displacement of each with a bone; below 0 if they may cross.
+    """A lower bound [mm] on the distance, over all frames, between two muscles that only follow the bones. It is the distance at
+    rest minus the greatest displacement of each with a bone; it is below 0 if the muscles may cross.
     """
-    between = max(spacing(one.surface), spacing(other.surface))  # their distances are between vertices
+    between = max(spacing(one.surface), spacing(other.surface))  # distances are measured between vertices
     return _apart(one.surface, other.surface) - between - _travel(one) - _travel(other)
 
 
@@ -226,7 +226,7 @@ def _apart(one: Surface, other: Surface) -> float:
 
 
 def _travel(rest: Setup) -> float:
-    """The greatest path [mm] of a point of the muscle with any bone, at its frames, at keyframes, and in between."""
+    """The longest path [mm] of a point of the muscle with any bone, sampled at frames, at keyframes, and in between."""
     points = rest.surface.points
     moved = [
         np.linalg.norm(apply(bone.pose(frame), points) - points, axis=1).max()

@@ -1,4 +1,4 @@
-"""Case -> set-up and problem, of a muscle or a scalar field, and their contents in words and numbers."""
+"""The set-up and the problem of a case, of a muscle or a scalar field, and their contents in words and numbers."""
 
 import logging
 from collections.abc import Callable
@@ -75,7 +75,7 @@ def facts(case: Case, setup: CaseSetup) -> dict[str, object]:
         known = {name: _facts_of_muscle(rest, part) for part, (name, rest) in own}
         return {
             **known,
-            "may touch": ", ".join(pairs) or ("no two" if case.touching else "no two, without the effect touching"),
+            "may touch": ", ".join(pairs) or ("none" if case.touching else "none, without the effect touching"),
         }
     assert isinstance(setup, FieldProblem)  # there are no other types
     mesh, fixed = setup.mesh, int(np.isfinite(setup.fixed).sum())
@@ -132,11 +132,11 @@ def _said(value: float | tuple[float, ...]) -> str:
 def _motion(motion: RigidMotion | None) -> str:
     if motion is None:
         return "rests"
-    how = f"slides along {_said(motion.axis)}, mm"
+    how, unit = f"slides along {_said(motion.axis)}", "mm"
     if motion.centre is not None:
-        how = f"turns about {_said(motion.centre)} mm along {motion.axis}, rad"
+        how, unit = f"rotates about {_said(motion.axis)} through {_said(motion.centre)} mm", "rad"
     keys = zip(motion.frames, motion.amounts, strict=True)
-    return f"{how} at frame: {', '.join(f'{amount:g} at {frame:g}' for frame, amount in keys)}"
+    return f"{how}: {', '.join(f'{amount:g} {unit} at frame {frame:g}' for frame, amount in keys)}"
 
 
 def known(case: Case, setup: CaseSetup) -> dict[str, object]:

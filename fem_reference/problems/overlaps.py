@@ -1,4 +1,4 @@
-"""Surface parts that may touch: their overlap at the start, found by contact search only if shallow, and the skin beyond rims."""
+"""Surface parts that may touch: their overlap at the start (contact search finds only a shallow one), and the skin beyond rims."""
 
 from functools import lru_cache
 
@@ -16,16 +16,16 @@ _SPLIT = np.array([[0, 1, 2], [2, 1, 3]])  # cuts a facet with four corners into
 
 
 def overlap(body: Body, law: Touching) -> float:
-    """A lower bound of the depth [mm] to which the parts of a ``law`` overlap at the start."""
+    """A lower bound on the depth [mm] to which the parts of a ``law`` overlap at the start."""
     points = body.mesh.points if body.start is None else body.start(np.array(body.mesh.points))
     return overlap_at(body.mesh, law, points)
 
 
 def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
-    """A lower bound of the depth [mm] to which the parts of a ``law`` overlap with the mesh at ``points`` (n, 3) [mm]: the greatest
-    depth of a corner of either part below the skin of the piece of the other part, and of facets that cross. For a part with
-    itself: of the middle of a facet within the entire skin, and of facets that cross the skin. Curved facets count by corners, less
-    their bulge.
+    """A lower bound on the depth [mm] to which the parts of a ``law`` overlap with the mesh at ``points`` (n, 3) [mm]: the greatest
+    depth of a corner of either part below the skin of the piece of the other part, or of facets that cross. For a part with itself
+    it is the greatest depth of the middle of a facet within the entire skin, or of facets that cross the skin. Curved facets are
+    measured at their corners, minus their bulge.
     """
     one, other = mesh.facets[law.one], mesh.facets[law.other]
     owner, facets, triangles = _skin(mesh, points)
@@ -48,8 +48,8 @@ def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
 
 
 def through_itself(now: Surface, rest: Surface) -> tuple[float, Floats]:
-    """A lower bound of the depth [mm] of self-penetration of a surface ``now``, and its place (3,), away from vertices with any at
-    ``rest``. Crossing triangles show less depth than a side within another side, which counts too if there is none at rest.
+    """A lower bound on the depth [mm] of self-penetration of a surface ``now``, and its place (3,), without vertices that penetrate
+    it at ``rest``. If there are none, the depth of triangles within the body counts too, as crossing triangles show less depth.
     """
     known = _crossing(rest) if len(pairs := self_crossings(now)) else ()
     new = pairs[~np.isin(now.triangles[pairs], known).any(axis=(1, 2))]

@@ -78,7 +78,7 @@ class Turn:
         return np.asarray(turned - arms)
 
     def turning(self, points: Floats) -> Turning:
-        """The knots, and there the angles of the point that turns most."""
+        """The knots, and at each knot the angle of the point that turns most."""
         _, _, along = self._arms(points)
         most = abs(self.angle) * float(np.abs(along).max(initial=0.0))
         return tuple(frame for frame, _ in self.knots), tuple(most * much for _, much in self.knots)

@@ -16,8 +16,8 @@ NO_SURFACE = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
 
 @dataclass(frozen=True, eq=False)
 class AtRest:
-    """Rest shapes that the frames of a run move, if they exist: the ``surface``, the ``fibres``, the tetrahedra of ``mesh``
-    and the unit vector along the fibres in each of them, ``directions`` (m, 3).
+    """The rest shapes that the frames of a run displace, if they exist: the ``surface``, the ``fibres`` and the tetrahedra of
+    ``mesh``. ``directions`` (m, 3): the unit vector along the fibres in each tetrahedron.
     """
 
     surface: Surface = NO_SURFACE

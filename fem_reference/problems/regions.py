@@ -19,7 +19,7 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 
-_LEAST = 0.5  # the least sum of the shares of all laws of a kind at a point
+_LEAST = 0.5  # The least accepted sum, at a point, of the shares of all laws of a kind.
 # The least accepted value of the greatest share in a region, which is low if the width exceeds the depth.
 _REACHED = 0.25
 _ROUNDED = 1e-6  # the rounding error of a sum of shares
@@ -77,8 +77,8 @@ def facts(rest: Setup) -> dict[str, str]:
 
 
 def check(body: Body) -> None:
-    """Raise InputError if an effect acts in a region that does not exist or has no points, shares are not from 0 to 1, or a part
-    of the body lacks an isochoric law, a volumetric law, or a law for the pressure unknown.
+    """Raise InputError if an effect acts in a region that does not exist or has no points, or if shares are not from 0 to 1. Raise
+    InputError also if a part of the body lacks an isochoric law, a volumetric law, or a law for the pressure unknown.
     """
     named = {i: region for i, effect in enumerate(body.effects) if (region := region_of(effect))}
     for i, region in named.items():
@@ -99,7 +99,7 @@ def check(body: Body) -> None:
             corners = body.points_on(effect.on)
             share = State(F=(), regions=body.shares(corners, np.zeros(len(corners), int))).share(region)
         if (most := float(share.max(initial=0.0))) < _REACHED:
-            got = f"whose share is {most:.2g} at most" if most else "which is nowhere in the body"
+            got = f"whose share is at most {most:.2g}" if most else "which is nowhere in the body"
             want = f"a share of {_REACHED:g} somewhere: more depth, or less width"
             raise InputError(f"effects[{i}].in", f'"{region}", {got}', want)
     laws = [effect for effect in body.effects if isinstance(effect, Energy)]

@@ -1,12 +1,12 @@
-"""Frame numbers at which load steps end, so that no step skips motion, for any frames.
+"""Frame numbers at which load steps end, so that no step skips motion between the requested frames.
 
-Between two stops no bone and no prescribed region turns by more than a right angle (from half a turn on, the straight line between
-two poses loses the sense of rotation), moves farther than the size of the body (without the motion common to all), or moves out and
-back by more than both a fifteenth of its distance and a hundredth of the body's size.
+Between two stops no bone and no prescribed region turns by more than a right angle: from half a turn on, the straight line between
+two poses loses the sense of rotation. None moves farther than the size of the body, without the motion common to all. None moves
+out and back by more than both a fifteenth of its distance and a hundredth of the body's size.
 
 Motions and paths of this package state the frames at which they bend and the angles by which they turn in between (``turning``), so
 this holds for all of them. Any other function of a frame number is sampled 1024 times over all frames, at least 16 times between
-two frames, and more often where it moves far: faster motion is not detected.
+two frames, and more often where it moves far. Faster motion is not detected.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,15 +27,15 @@ TURN, _SAMPLED, _STRIDE = np.pi / 2, np.pi / 16, 0.5
 # A quarter of a circle is 1.11 times as long as its chord. A path counts as returning if it is longer than ``_BENT`` chords and
 # exceeds the chord by ``_BACK`` times the body's size.
 _BENT, _BACK = 1.12, 0.01
-_SAMPLES, _BETWEEN = 1024, 16  # samples of an unknown motion, over all frames and between two
-_POINTS = 32  # sampled points of a region
-_MOST = 20_000  # sampled frames
+_SAMPLES, _BETWEEN = 1024, 16  # the number of samples of an unknown motion, over all frames and between two
+_POINTS = 32  # the number of sampled points of a region
+_MOST = 20_000  # the largest number of sampled frames
 _SHORTEST = 1e-9  # the share of all frames within which a long motion counts as a jump
 
 
 @dataclass(frozen=True)
 class Moving:
-    """Points (p, 3) [mm] ``at`` a frame number, known ``turning``, ``place`` in messages; ``scale``: True for an amount."""
+    """Moving points (p, 3) [mm] ``at`` a frame, their ``turning``, if known, and ``place``, for messages; ``scale``: an amount."""
 
     place: str
     at: Callable[[float], Floats]
@@ -89,7 +89,7 @@ def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tup
 
 
 def skipped(things: Sequence[Moving], frames: Sequence[float], size: float) -> tuple[Moving, float, float] | None:
-    """The thing that moves more than allowed from one of ``frames`` to the next, and these two frames; None if nothing does."""
+    """The first of ``things`` that moves too far from one of ``frames`` to the next, and these two frames; None without any."""
     looked = _Samples(things, np.unique(np.concatenate([frames, *(_grid(thing, frames) for thing in things)])), size)
     for early, late in pairwise(np.searchsorted(looked.frames, frames).tolist()):
         for i, thing in enumerate(things):
@@ -152,11 +152,11 @@ class _Samples:
         return (self.frames[:-1] + spans / 2)[found]
 
     def _jump(self, i: int) -> InputError:
-        """The error for the thing that moves farthest in the interval of number ``i``."""
+        """The error for the thing that moves farthest in the interval ``i``."""
         far = [float(strides[i].max()) for strides in self.strides]
         which = int(np.argmax(far))
         got = f"{far[which]:.4g} mm up to frame {self.frames[i + 1]:g}, or a turn by {self.angles[which][i]:.3g} rad"
-        return InputError(f"{self.things[which].place}: path at frame {self.frames[i]:g}", got, "one without jumps")
+        return InputError(f"{self.things[which].place}: path at frame {self.frames[i]:g}", got, "a path without jumps")
 
     def farthest(self, at: int) -> int:
         """The number of the last frame up to which one load step may go from the frame of number ``at``."""

@@ -33,7 +33,7 @@ class Flux:
 @dataclass(frozen=True, eq=False)
 class FieldProblem:
     """A scalar field to be solved: ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node (the vertices, then
-    for order 2 the middles of ``mesh.edges``), NaN if it is free; ``upper`` (m,) the share of each cell above the mean y;
+    for order 2 the midpoints of ``mesh.edges``), NaN if it is free; ``upper`` (m,) the share of each cell above the mean y;
     ``tau`` (m,) of the stabilised form, None for the plain form; ``peclet`` the mesh Peclet number; ``exact`` the known solution.
     """
 
@@ -63,7 +63,7 @@ class FieldProblem:
         return self
 
     def write_meshes(self, folder: Path) -> None:
-        """Write the mesh, with the values that are fixed, into ``folder``, for ParaView."""
+        """Write the mesh with its fixed values into ``folder``, for ParaView."""
         points, cells = self.mesh.points, self.mesh.cells
         files.write_field(folder / "mesh.vtu", points, cells, {"fixed": self.fixed[: len(points)]})
 
@@ -135,7 +135,7 @@ def _check_effects(case: ScalarCase, mesh: FieldMesh) -> None:
 
 
 def _try(formula: str, points: Floats, place: str) -> None:
-    """InputError at ``place`` where a formula names an unknown coordinate, or has no finite value at one of ``points``."""
+    """Raise InputError at ``place`` if a formula names an unknown coordinate, or has no finite value at one of ``points``."""
     try:
         values = at(formula, points)
     except InputError as error:
@@ -165,7 +165,7 @@ def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
             path = case.file(entry.bounds, f"boundary[{i}].bounds")
             table = numbers(path)
             if len(table) != 2:
-                raise InputError(path, f"{len(table)} rows", "2: vertices, and values")
+                raise InputError(path, f"{len(table)} rows", "2 rows: vertices and values")
             vertices = whole_numbers(path, table[0]) - 1
             low, high = vertices.min() + 1, vertices.max() + 1
             if low < 1 or high > len(values):
@@ -173,13 +173,13 @@ def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
             if len(np.unique(vertices)) < len(vertices):
                 raise InputError(path, "a vertex named twice", "one value for each vertex")
             if (np.abs(values[vertices] - table[1]) > 0).any():
-                raise InputError(path, "values unlike those of another file of bounds", "one value for each vertex")
+                raise InputError(path, "values that differ from another file of bounds", "one value for each vertex")
             values[vertices] = table[1]
     return values
 
 
 def _between(mesh: FieldMesh, values: Floats) -> Floats:
-    """The values (e,) at the middles of edges: on the rim the mean of the values of both ends if both have a value, else NaN."""
+    """The values (e,) at the midpoints of edges: on the rim the mean of the values of both ends if both have a value, else NaN."""
     edges = mesh.edges
     middles = np.full(len(edges), np.nan)
     if mesh.cells.shape[1] == 3:
@@ -202,7 +202,7 @@ def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
         if entry.slope is not None:
             keys = facets @ [len(mesh.points), 1][-facets.shape[1] :]  # different for any two facets
             if np.isin(keys, sloped).any():
-                raise InputError(f"{place}.slope", "a facet that has a slope already", "one slope for each facet")
+                raise InputError(f"{place}.slope", "a facet that already has a slope", "one slope for each facet")
             sloped = np.concatenate([sloped, keys])
         if len(facets) == 0:
             raise InputError(f"{place}.on", f'"{entry.on}", which has no facets', "an end or a rim of the domain")
@@ -231,7 +231,7 @@ def _facets(entry: Boundary, mesh: FieldMesh) -> Ints:
 
 
 def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
-    """The nodes on facets: their vertices, and for order 2 the middles of facets that are edges."""
+    """The nodes on facets: their vertices, and for order 2 the midpoints of facets that are edges."""
     vertices = np.unique(facets)
     if order == 1 or facets.shape[1] == 1:
         return vertices
@@ -260,7 +260,7 @@ def _mesh_files(case: ScalarCase, given: MeshFiles) -> FieldMesh:
     path = case.file(given.points, "domain.mesh.points")
     points = numbers(path)
     if points.shape[1] not in (2, 3):
-        raise InputError(path, f"rows of {points.shape[1]} numbers", "2 or 3 coordinates a vertex")
+        raise InputError(path, f"rows of {points.shape[1]} numbers", "2 or 3 coordinates per vertex")
     if given.triangles == "delaunay":
         if points.shape[1] == 3:
             raise InputError(join(case.place, "domain.mesh.triangles"), '"delaunay" of points in space', "a file")
@@ -272,7 +272,7 @@ def _mesh_files(case: ScalarCase, given: MeshFiles) -> FieldMesh:
     path = case.file(given.triangles, "domain.mesh.triangles")
     triangles = whole_numbers(path, numbers(path))
     if triangles.shape[1] != 3:
-        raise InputError(path, f"rows of {triangles.shape[1]} numbers", "3 vertices a triangle")
+        raise InputError(path, f"rows of {triangles.shape[1]} numbers", "3 vertices per triangle")
     return FieldMesh(points, triangles - 1, str(path))
 
 

@@ -36,8 +36,8 @@ def kept_distances() -> Path:
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A rigid bone: its ``surface`` at rest; its ``motion``, None if it rests; the allowed error and the Gaussian rounding of its
-    distance [mm], as in ``CaseBone``; and its closed form ``solid``, if any, on which the vertices of the surface lie.
+    """A rigid bone with its ``surface`` at rest and its ``motion``, None if it rests. The allowed error and the Gaussian rounding
+    of its distance [mm] are those of ``CaseBone``. The vertices of the surface lie on the closed form ``solid``, if there is one.
     """
 
     name: str
@@ -67,7 +67,7 @@ class Bone:
 class Joint:
     """A joint in which a ``bone`` turns about the unit vector ``axis`` (3,) through ``centre`` (3,) [mm], right-handed.
 
-    ``angle_of``: its angle [rad] at a frame number, 0 at rest.
+    ``angle_of``: the angle of the joint [rad] at a frame number, 0 at rest.
     """
 
     name: str
@@ -98,8 +98,8 @@ class AttachedVertices:
 class Setup:
     """The set-up of a muscle, as needed by a surface solver: its ``surface`` at rest, the bones, the attached vertices, and the
     requested frames. ``interval`` [s]: the time between successive frame numbers, if the case states it. ``start``: a function from
-    rest positions (n, 3) to positions in the first frame, if they differ. ``joints``: bones turn about their axes. ``regions``: by
-    name, in which effects act.
+    rest positions (n, 3) to positions in the first frame, if they differ. ``joints``: the axes of bones that turn. ``regions``:
+    parts in which effects act, by name.
     """
 
     surface: Surface
@@ -181,7 +181,7 @@ def _angle(motion: RigidMotion, sign: float, frame: float) -> float:
 def _check_axis(motion: RigidMotion, axis: Floats, centre: Floats, place: str) -> None:
     turns, away = motion.along, centre - np.array(motion.centre)
     if np.linalg.norm(np.cross(axis, turns)) > _SAME_DIRECTION * np.linalg.norm(axis):
-        want = f"that of the bone's motion, {motion.axis}, or its opposite"
+        want = f"the axis of the bone's motion, {motion.axis}, or its opposite"
         raise InputError(join(place, "axis"), str(tuple(axis.tolist())), want)
     if (off := float(np.linalg.norm(away - (away @ turns) * turns))) > _SAME_LINE:
         raise InputError(join(place, "centre"), f"a point {off:.3g} mm off the axis of the bone's motion", "one on it")

@@ -1,6 +1,6 @@
 """Structured bodies of the catalogue: smooth maps of unit cubes, cut into cells, straight or curved.
 
-All lengths in mm. A region lists the corners of its facets in lattice order: in a quadrilateral, corners 0 and 3 are opposite.
+All lengths are in mm. A region lists the corners of its facets in lattice order: in a quadrilateral, corners 0 and 3 are opposite.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +19,7 @@ from fem_reference.problems.checks import check_box
 Map = Callable[[Floats], Floats]
 Counts = tuple[int, int, int]
 
-# Nodes nearer than this share of the body's size are one node.
+# Nodes closer to each other than this share of the body's size are one node.
 _SAME = 1e-9
 # The bulge of the sides of the square in a disc for which three blocks meet at its corners at 120 degrees each.
 _BULGE = np.tan(np.pi / 12) / 2
@@ -34,8 +34,8 @@ _APEX = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Brick:
-    """A part of a body: ``place`` maps points (n, 3) of the unit cube smoothly to points (n, 3) [mm], ``counts`` are the numbers
-    of cells along its axes, and ``faces`` maps a face of the cube, x0 to z1, to its region of the surface.
+    """A part of a body: ``place`` maps points (n, 3) of the unit cube smoothly to points (n, 3) [mm]. ``counts`` are the numbers of
+    cells along its axes. ``faces`` maps a face of the cube, x0 to z1, to its region of the surface.
 
     Where two blocks meet, the axes along their common face have the same directions, so that the tetrahedra match.
     """
@@ -63,7 +63,7 @@ def mapped(blocks: Sequence[Brick], kind: Kind, degree: int) -> Cells:
 
 
 def _lattice(counts: Counts, kind: Kind, degree: int) -> Ints:
-    """Places of the nodes of each cell in the lattice of nodes, (m, k, 3); tetrahedra are Kuhn's six in each cube."""
+    """Places of the nodes of each cell in the lattice of nodes, (m, k, 3); tetrahedra are the six Kuhn tetrahedra of each cube."""
     nodes = reference_nodes(kind, degree)
     if kind == "hexahedron":
         patterns = [nodes]
@@ -106,7 +106,7 @@ _SIX = {face: face for face in ("x0", "x1", "y0", "y1", "z0", "z1")}
 def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: int = 1) -> Cells:
     """A box from the origin, with its faces x0, x1, y0, y1, z0, z1 and edges of lengths ``size`` [mm] along x, y, z.
 
-    ``counts`` of cells along x, y, z; a tetrahedral box has six tetrahedra in each. ``kind``: ``"tetrahedron"`` or
+    ``counts``: the cells along x, y, z; a tetrahedral box has six tetrahedra in each. ``kind``: ``"tetrahedron"`` or
     ``"hexahedron"``. ``degree`` 1: straight cells; 2: cells with nodes on their edges too.
     """
     check_box(counts, size, kind, degree)
@@ -121,7 +121,7 @@ def joined(pieces: Mapping[str, Cells]) -> Cells:
     starts = dict(zip(pieces, np.cumsum([0, *(len(mesh.points) for mesh in meshes)]), strict=False))
     named = {f"{name}_{on}": starts[name] + f for name, mesh in pieces.items() for on, f in mesh.facets.items()}
     if len(named) < sum(len(mesh.facets) for mesh in meshes):
-        raise InputError("pieces", f"two regions of one name among {', '.join(named)}", "names that differ once joined")
+        raise InputError("pieces", f"two regions with one name among {', '.join(named)}", "different names once joined")
     cells = np.concatenate([starts[name] + mesh.cells for name, mesh in pieces.items()])
     return Cells(np.concatenate([mesh.points for mesh in meshes]), cells, *kinds.pop(), named)
 
@@ -144,7 +144,7 @@ def warped_box(
 def tube_quarter(inner: float, outer: float, length: float, counts: Counts, kind: Kind, degree: int) -> Cells:
     """The quarter x, y >= 0 of a tube along z, of radii ``inner`` and ``outer`` and a ``length`` [mm].
 
-    It has ``counts`` of cells through its wall, around the quarter and along it. Faces: inner, outer, x0, y0, bottom, top.
+    ``counts`` are the numbers of cells through its wall, around the quarter and along it. Faces: inner, outer, x0, y0, bottom, top.
     """
 
     def place(unit: Floats) -> Floats:
@@ -188,7 +188,7 @@ def _patches(place: Callable[[Floats, Floats, Floats], Floats], counts: Counts, 
 
 
 def _square(flat: Floats, half: float) -> Floats:
-    """Points (n, 2) of the rounded square with ``half`` a side in the unit disc, from ``flat`` (n, 2) in [-1, 1]."""
+    """Points (n, 2) of the rounded square of half side ``half`` in the unit disc, from ``flat`` (n, 2) in [-1, 1]."""
     return np.asarray(half * flat * (1 + _BULGE * (1 - flat[:, ::-1] ** 2)))
 
 
@@ -205,7 +205,7 @@ def _fan(unit: Floats, half: float, low: float, side: tuple[int, int]) -> Floats
 def _disc(place: Map, half: float, counts: Counts, faces: dict[str, str], *, quarter: bool) -> list[Brick]:
     """Blocks of a body over the unit disc, or its quarter x, y >= 0: ``place`` takes (x, y, third in [0, 1]) to points [mm].
 
-    A square with ``half`` a side is in the middle; ``counts``: the cells along half its side, from it to the circle and along the
+    A square of half side ``half`` is in the middle; ``counts``: the cells along half its side, from it to the circle, and along the
     third coordinate; ``faces`` of the blocks: x1 is the rim, z0 and z1 the ends.
     """
     side, rings, layers = counts
@@ -229,7 +229,7 @@ def _disc(place: Map, half: float, counts: Counts, faces: dict[str, str], *, qua
 def cylinder(radius: float, length: float, rings: int, slices: int, kind: Kind, degree: int) -> Cells:
     """A solid cylinder of a ``radius`` and a ``length`` [mm] along z from the origin.
 
-    It has ``rings`` of cells around a rounded square with twice as many along a side, in ``slices``. Faces: bottom, top, side.
+    ``rings`` of cells surround a rounded square with twice as many cells along a side, in ``slices``. Faces: bottom, top, side.
     """
     faces = {"z0": "bottom", "z1": "top", "x1": "side"}
     blocks = _disc(
@@ -255,8 +255,8 @@ _VENTRICLE = {"z0": "endo", "z1": "epi", "x1": "base"}
 def ventricle(counts: Counts, kind: Kind, degree: int) -> Cells:
     """The truncated ellipsoid of Land et al. 2015: along z, its apex at z = -17 inside and -20 outside, cut at z = 5 [mm].
 
-    ``counts`` of cells around an eighth of a turn, from the square at the apex to the base, and through the wall; their sizes are
-    alike for (2 n, 7 n, 2 n). Faces: endo, epi, base.
+    ``counts``: the cells around an eighth of a turn, from the square at the apex to the base, and through the wall; their sizes are
+    similar for (2 n, 7 n, 2 n). Faces: endo, epi, base.
     """
     return mapped(_disc(_in_ventricle, _SQUARE_IN_VENTRICLE, counts, _VENTRICLE, quarter=False), kind, degree)
 

@@ -1,4 +1,4 @@
-"""Stresses in solved states by the energies of effects, independently of any solver; including effects that were left out."""
+"""Stresses in solved states from the energies of effects, including omitted effects, independent of any solver."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -29,8 +29,8 @@ _SMALLEST = 0.05  # the least det F of sampled tetrahedra: curved tetrahedra may
 
 
 def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float = 0.0) -> Floats:
-    """``dW/dF`` (count, 3, 3) [MPa], W the sum of the energies per rest volume of effects ``acting``, (effect, amount) each, and of
-    a stress ``at_rest``, at a ``state`` whose F consists of jets.
+    """``dW/dF`` (count, 3, 3) [MPa] at a ``state`` whose F consists of jets. W is the sum of the energies per rest volume of the
+    effects ``acting``, pairs (effect, amount), and of a stress ``at_rest``.
     """
     energy = total_energy(acting, state) + at_rest
     slope = energy.slope if isinstance(energy, Jet) else np.zeros((9, 1))
@@ -175,10 +175,10 @@ class Watch:
         """The decision on an effect: by the stress that it adds in the tetrahedra, and for fibres by this stress only."""
         effect = self.left[i]
         found = effect.indicator(now)
-        assert found is not None  # effects that were left out have one
+        assert found is not None  # every omitted effect has an indicator
         if stresses is not None:
             guessed = 0.0 if "fibre" in effect.needs else found.stress
-            found = replace(found, stress=float(np.max([guessed, stresses.added[i]])))  # NaN if either is
+            found = replace(found, stress=float(np.max([guessed, stresses.added[i]])))  # NaN if either is NaN
         return decision(effect, found, now)
 
     def _moving(self, now: Estimates, number: float) -> Estimates:

@@ -26,7 +26,7 @@ def check(body: Body) -> None:
     """Raise InputError if a tendon is combined with tension at rest."""
     if in_situ.among(body.effects) is not None and any(entry.anchor is not None for entry in body.prescribed):
         raise InputError(
-            "effects", "a tendon beside in_situ", "one of them: the tension of a tendon at rest is unknown"
+            "effects", "a tendon beside in_situ", "only one of these: the tension of a tendon at rest is unknown"
         )
 
 
@@ -52,6 +52,6 @@ def _springs(effect: Tendon, rest: Setup, mesh: TetMesh, fibres: Polylines) -> P
     shares = attached_shares(rest.surface, np.setdiff1d(np.flatnonzero(away <= effect.reach), rest.attached_vertices))
     skin = attached_skin(rest.surface, shares, mesh, spacing(rest.surface))
     if not skin.areas.sum() > 0:
-        raise InputError(f"{place}.reach", f"{effect.reach:g} mm, within which no triangle is free", "a greater one")
+        raise InputError(f"{place}.reach", f"{effect.reach:g} mm, within which no triangle is free", "a greater reach")
     path, (x, y, z) = Follows(From(rest.frames[0], entry.bone.pose)), map(float, entry.tendon)
     return Prescribed(force_name(effect.on), skin, (0, 1, 2), path, effect.stiffness / skin.areas.sum(), (x, y, z))

@@ -21,9 +21,9 @@ class Touching:
     points of either part and the present surface of the other. Under pressure p the parts overlap by p / k. ``friction``: the
     coefficient of Coulomb's law, as in ``ContactLaw``; None without friction. ``relaxed``: two frame numbers over which an overlap
     at rest is removed, as with bones. If None, an overlap of two parts presses at once, and an overlap of a part with itself only
-    after it has opened. ``around``: True where points of either part also feel the skin around the other, such as that of
-    attachments; otherwise a point that slides past the other's rim ends the run. That skin has no points of its own. So contact
-    there is half as stiff: the mean traction is half the reported pressure, and half the area counts.
+    after it has opened. ``around``: True if points of either part also touch the skin around the other part, such as
+    attached skin; otherwise a point that slides past the rim of the other part ends the run. This skin has no contact points, so
+    contact there is half as stiff: the mean traction is half the reported pressure, and half the area counts.
     """
 
     one: str
@@ -45,13 +45,13 @@ class Touching:
         return pressure_name(self.one, self.other)
 
     def allowance(self, frame: float) -> float:
-        """The share of the overlap at rest that is subtracted at ``frame``; for a part with itself all of it, unless it is removed,
-        so that there is no pressure at rest.
+        """The share of the overlap at rest that is subtracted at ``frame``. For a part with itself it is 1, unless the overlap is
+        removed, so that there is no pressure at rest.
         """
         return float(self.one == self.other) if self.relaxed is None else remaining(self.relaxed, frame)
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative in the gap [MPa/mm]; NaN if the gap is NaN."""
+        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative with respect to the gap [MPa/mm]; NaN if the gap is NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
 
 
@@ -68,8 +68,8 @@ def with_itself(acting: Sequence[Effect], part: str) -> tuple[Touching, ...]:
 
 def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[str, Ints], *, moved: bool) -> None:
     """Raise InputError unless each law has a stiffness and a smoothing, and its two regions of ``facets`` (f, 3 or 4) belong to
-    separate pieces of the mesh of ``cells`` (m, k); or are the same region, in a body that does not begin ``moved``. No pair of
-    facets may be under two laws.
+    separate pieces of the mesh of ``cells`` (m, k). They may also be the same region, in a body that does not begin ``moved``. No
+    pair of facets may be under two laws.
     """
     if not touching:
         return
@@ -83,7 +83,7 @@ def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[st
             raise InputError(f"touching[{i}]", got, "regions of separate pieces, or one region with itself")
         if law.one == law.other and moved:  # it is unknown which side was in front
             raise InputError(
-                "start", f'places, and "{law.one}" that touches itself', "none: such contact begins at rest"
+                "start", f'places, and "{law.one}" that touches itself', "none, as such contact begins at rest"
             )
     _check_pairs(touching, facets, piece)
 

@@ -65,7 +65,7 @@ class Contents(Record):
 
     _check_scalars = rule(
         lambda one: all(len(values) == len(one.numbers) for values in one.scalars.values()),
-        "as many values of each of the scalars as there are numbers of frames",
+        "as many values of each of the scalars as there are frame numbers",
     )
 
 
@@ -77,7 +77,7 @@ def frame_file(number: float, suffix: str) -> str:
     'frame_0010.vtp'
     """
     if number % 1:
-        raise ValueError(f"frame {number:g} has no file, as its number is not whole")
+        raise ValueError(f"frame {number:g} has no file, as its number is not an integer")
     return f"frame_{number:04.0f}{suffix}"
 
 

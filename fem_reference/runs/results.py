@@ -143,7 +143,7 @@ class Results:
         own = state.response.shape, state.response_pressure.shape
         if in_situ.among(self.effects) is not None and own != shapes:
             got = f"arrays response {own[0]} and response_pressure {own[1]}"
-            want = f"{shapes[0]} and {shapes[1]}: the stress at rest of a muscle in situ follows from them"
+            want = f"{shapes[0]} and {shapes[1]}: they determine the stress at rest of a muscle in situ"
             raise InputError(f"state at frame {frame:g}", got, want)
         return state
 

@@ -82,7 +82,7 @@ def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
     """The mesh and the fibre directions (m, 3) of the states in a run's ``folder``; InputError if there are none."""
     place = folder / FOLDER / "rest.npz"
     if not place.is_file():
-        raise InputError(folder, "a run without states", "one of the reference, solved with store_state = true")
+        raise InputError(folder, "a run without states", "a run of the reference, solved with store_state = true")
     arrays = read_arrays(place, ("points", "tets", "fibre"))
     points, tets, fibre = arrays["points"], arrays["tets"], arrays["fibre"]
     fits = points.dtype.kind == fibre.dtype.kind == "f" and tets.dtype.kind == "i" and fibre.ndim == 2
@@ -90,7 +90,7 @@ def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
     fits = fits and tets.size > 0 and tets.min() >= 0 and tets.max() < len(points) and len(fibre) in (0, len(tets))
     if not (fits and np.isfinite(points).all()):
         got = f"arrays {points.shape}, {tets.shape} and {fibre.shape}"
-        raise InputError(place, got, "finite points (n, 3), tets (m, 4) of them and fibre (m or 0, 3)")
+        raise InputError(place, got, "finite points (n, 3), tets (m, 4) of these points and fibre (m or 0, 3)")
     return TetMesh(points, tets), fibre if len(fibre) else None
 
 

@@ -77,7 +77,7 @@ Sink = Callable[[Frame], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a solve: a status, a sentence for people, and the cost (seconds by phase ``seconds_...``, counts)."""
+    """The outcome of a solve: a status, a sentence for the user, and the cost (seconds by phase ``seconds_...``, counts)."""
 
     status: Status
     message: str
@@ -151,7 +151,7 @@ class Run:
         return scalar_vectors(self.scalars, "force_on_", bone)
 
     def moment(self, bone: str, centre: ArrayLike = (0.0, 0.0, 0.0)) -> Floats:
-        """The moment (f, 3) [N mm] of that force about the point ``centre`` (3,) [mm]."""
+        """The moment (f, 3) [N mm] of the force on a ``bone`` about the point ``centre`` (3,) [mm]."""
         return scalar_vectors(self.scalars, "moment_on_", bone) - np.cross(point(centre), self.force(bone))
 
     def _repr_html_(self) -> str:

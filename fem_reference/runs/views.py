@@ -10,7 +10,7 @@ from fem_reference.problems.joining import Span, called
 from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.runs.store import Frame, Run
 
-# Scalars of all muscles together, which are left out for a single one.
+# Scalars of all muscles together, which are left out for a single muscle.
 _OF_ALL = (
     "volume_ratio",
     "energy",
@@ -26,7 +26,7 @@ _OF_ALL = (
 
 def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
     """The part of a ``frame`` of several muscles for one muscle; a force on it by one of the ``others`` has the other's name."""
-    assert frame.surface is not None  # frames of the reference have one
+    assert frame.surface is not None  # frames of the reference have a surface
     assert frame.fibres is not None
     forces, moments = (
         {own: vector for key, vector in some.items() if (own := _own(key, span.name, others))}

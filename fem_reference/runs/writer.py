@@ -1,6 +1,6 @@
 """Runs written to disk while they are solved, frame by frame.
 
-Files are written atomically, ``run.json`` after the frame files that it names. A run with status ``running`` was cut off or
+Files are written atomically, ``run.json`` after the frame files that it names. A run with the status ``running`` was cut off or
 crashed; it is not read as a result, and continues if its solver can continue it.
 """
 

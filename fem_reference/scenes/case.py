@@ -20,14 +20,14 @@ from fem_reference.foundations.markup import fact_table
 from fem_reference.foundations.records import FileName, Name, Record, join
 
 DATA_SETTING = "FEM_REFERENCE_DATA"
-# The setting with further folders, separated as in PATH, from which scene files may read files.
+# The environment variable with further folders, separated as in PATH, from which scene files may read files.
 ALLOWED_SETTING = "FEM_REFERENCE_FILES"
 COMMAND = "command"  # the solver that runs a program; a scene file cannot choose this solver
 DELAUNAY = "delaunay"  # the word that replaces the name of a file of triangles
 # Settings of solvers that change the time but not the result.
 MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
 
-# Standards of a measurement: the reference (for itself, its rest state), the exact solution, or the run itself.
+# Standards of a measurement: the reference (its rest state for the reference itself), the exact solution, or the run itself.
 Standard = Literal["reference", "exact", "itself"]
 # Parts of a run that can be measured.
 Part = Literal["surface", "lines", "field"]
@@ -119,7 +119,7 @@ class Case(Record):
 
     @property
     def parts(self) -> "tuple[Case, ...]":
-        """The muscles of a case of several, each as a separate case; none for any other case."""
+        """The muscles of a case of several muscles, each as a separate case; none for any other case."""
         return ()
 
     def expecting(self, more: tuple[Expectation, ...]) -> Self:
@@ -133,7 +133,7 @@ class Case(Record):
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """The frame numbers wanted."""
+        """The requested frame numbers."""
         raise NotImplementedError(f"{type(self).__name__} has no frames")
 
     def standards(self, of: str) -> frozenset[Standard]:  # noqa: ARG002
@@ -178,7 +178,7 @@ class Case(Record):
         return path
 
     def _check_allowed(self, path: Path, place: str, text: str) -> None:
-        """Raise InputError if a scene file names a file that, links followed, is outside the folders that it may read."""
+        """Raise InputError if a scene file names a file that, after links are followed, is outside the folders it may read."""
         if not self.from_file:
             return
         settings = os.pathsep.join(os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))
@@ -192,7 +192,7 @@ class Case(Record):
         candidates = ((f"candidate[{i}]", one) for i, one in enumerate(self.candidate))
         for key, one in (("reference", self.reference), *candidates):
             if self.from_file and one.solver == COMMAND:
-                want = "another one: a scene file runs no program; --solver-command does"
+                want = "another solver: a scene file cannot run a program; --solver-command can"
                 raise InputError(join(self.place, f"{key}.solver"), f'"{COMMAND}"', want)
 
     @property
@@ -212,8 +212,8 @@ class Case(Record):
 
     @property
     def key(self) -> str:
-        """A hash over everything that determines the solution: the keys of ``determined_by``, the effects, the content of the files
-        that they name, and of the files of effects outside the package.
+        """A hash of everything that determines the solution: the keys of ``determined_by``, the effects, the content of the files
+        named there, and the content of the files of effects outside the package.
         """
         tables = self.determining()
         tables["effect"] = [[type(effect).__name__, effect.model_dump(mode="json")] for effect in self.effects]

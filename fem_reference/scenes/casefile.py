@@ -1,4 +1,4 @@
-"""case.toml -> Case: strict reading. An unknown, missing or wrong key is an InputError that names file and key."""
+"""Strict reading of a case.toml as a Case: an unknown, missing or wrong key is an InputError that names the file and the key."""
 
 from contextlib import suppress
 from copy import deepcopy
@@ -25,7 +25,7 @@ def cases() -> list[str]:
 
 
 def read(case: str | Path, *, with_negative_control: bool = False, changes: dict[str, Any] | None = None) -> Case:
-    """A shipped case by name, or the case in a folder or a file; a case with a ``domain`` is of a scalar field.
+    """A shipped case by name, or the case in a folder or a file; a case with a ``domain`` has a scalar field.
 
     ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values. ``with_negative_control`` applies the
     negative control, which is checked in any case, except after changes of other keys.
@@ -68,7 +68,7 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: boo
         for part in parents:
             inside = inside[part]
         if not (add and last and isinstance(inside, dict)):
-            inside[last]  # an error where there is no value to change
+            inside[last]  # raises an error if there is no value to change
         inside[last] = value
     except (KeyError, IndexError, TypeError) as error:
         want = f"a key that this scene has, or a key of a table that it has{_near(table, [*parents, last])}"
@@ -124,7 +124,7 @@ def _with_negative_control(case: Case, table: dict[str, Any], path: Path) -> Cas
     """The ``case`` of ``table`` with its negative control applied; ``table`` is not changed."""
     place, control = str(path), case.negative_control
     if control is None:
-        raise InputError(join(place, "negative_control"), "None", "a key to change, its value, and why")
+        raise InputError(join(place, "negative_control"), "None", "a key to change, its value and the reason")
     table = deepcopy(table)
     try:
         _change(table, control.key, control.value, place, add=False)
@@ -209,7 +209,7 @@ def with_effects(table: Any, place: str, kind: type[Record] = Effect) -> Any:
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
     """Check that an effect acts once in each region (two effects of one name would share their unknowns) and a load once on each
-    part of the surface, and that no bulk modulus is below the shear modulus of its region, which is usually a mistake in units.
+    part of the surface. No bulk modulus may be below the shear modulus of its region, as this is usually a mistake in units.
     """
     places = [region_of(effect) for effect in effects]
     acting = [(name, getattr(effect, "on", ""), at) for name, effect, at in zip(names, effects, places, strict=True)]
@@ -240,7 +240,7 @@ def _check_muscles(case: MusclesCase) -> None:
     others += [one.name for muscle in case.muscle for one in muscle.attachment]
     check_once([*(muscle.name for muscle in case.muscle), *dict.fromkeys(others)], join(case.place, "muscle"))
     if case.expect:
-        raise InputError(join(case.place, "expect"), "expectations of all muscles", "muscle[i].expect, of one of them")
+        raise InputError(join(case.place, "expect"), "expectations of all muscles", "muscle[i].expect, for each muscle")
     if in_situ.among(case.effects) is not None:
         raise InputError(
             join(case.place, "effect"), '"in_situ" with several muscles', "muscles that rest without stress"

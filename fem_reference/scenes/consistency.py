@@ -1,4 +1,4 @@
-"""Checks of a muscle's case across its keys: names are unique and refer to something, and the muscle is at rest at first."""
+"""Checks of a muscle's case across its keys: names are unique and refer to something, and the muscle starts at rest."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from fem_reference.foundations.records import Record, check_once, check_used, jo
 from fem_reference.scenes import regions
 from fem_reference.scenes.muscle import Frames, MuscleCase
 
-# The name of the surface on which a load acts if not on an attachment: the part that is not attached to bone.
+# The name of the surface on which a load acts if it does not act on an attachment: the part that is not attached to bone.
 FREE = "free"
 # The stretch of fibres slightly beyond their given length.
 _GIVEN = 1 - 1e-5
@@ -35,7 +35,7 @@ def check_names(case: MuscleCase) -> None:
 
 
 def _check_loads(case: MuscleCase) -> None:
-    """Check that no load is on an exact attachment, where it would go to the bone and deform nothing."""
+    """Check that no load is on an exact attachment, where the bone would carry it and nothing would deform."""
     exact = [attachment.name for attachment in case.attachment if attachment.stiffness is None]
     for i, effect in enumerate(case.effects):
         if isinstance(effect, Load) and effect.on in exact:
@@ -50,54 +50,54 @@ def _check_forces(case: MuscleCase) -> None:
     for i, attachment in enumerate(case.attachment):
         if contact and attachment.name in bones:
             place = join(case.place, f"attachment[{i}].name")
-            raise InputError(place, f'"{attachment.name}", which a bone in contact has too', "a name of its own")
+            raise InputError(place, f'"{attachment.name}", which a bone in contact has too', "a different name")
     stays = any(isinstance(effect, Damping) or "momentum" in effect.needs for effect in case.effects)
     if not case.attachment and not stays:
-        want = 'an attachment, soft as it may be, or the effect "damping" or "inertia": without any the muscle drifts'
+        want = 'an attachment, however soft, or the effect "damping" or "inertia": otherwise the muscle drifts'
         raise InputError(join(case.place, "attachment"), "none", want)
 
 
 def check_rest(case: MuscleCase) -> None:
-    """Check that the muscle is at rest at the first frame: every bone is where its surface is, and no effect with an amount over
-    time acts, unless a stress at rest balances it.
+    """Check that the muscle is at rest at the first frame: every bone is where its surface is, and no effect with a ramp acts,
+    unless a stress at rest balances it.
     """
     for i, effect in enumerate(case.effects):
         acts = isinstance(effect, Ramped) and effect.amount(case.frames.first) != 0
         if acts and in_situ.among(case.effects) is None:
             got = f"an amount of {effect.amount(case.frames.first):g} at frame {case.frames.first}, the first"
-            want = '0 there, where the muscle rests, or the effect "in_situ", which balances it'
+            want = '0 there, as the muscle is at rest, or the effect "in_situ", which balances it'
             raise InputError(join(case.place, f"effect[{i}].ramp"), got, want)
     _check_slack(case)
     for i, bone in enumerate(case.bone):
         pose = bone.motion.poses().pose(case.frames.first) if bone.motion else np.eye(4)
         if not abs(pose - np.eye(4)).max() <= 1e-12:  # NaN is not at rest
             slid = np.array_equal(pose[:3, :3], np.eye(3))
-            what, want = ("moved", "distance 0 there") if slid else ("turned", "angle 0 there")
+            what, want = ("moved", "a distance of 0") if slid else ("turned", "an angle of 0")
             raise InputError(join(case.place, f"bone[{i}].motion"), f"a bone {what} at the first frame", want)
 
 
 def _check_slack(case: MuscleCase) -> None:
-    """Check that passive fibres pull in the given shape only beside a stress at rest that balances them."""
+    """Check that passive fibres pull in the given shape only if a stress at rest balances them."""
     for i, effect in enumerate(case.effects):
         # Slightly beyond the given length, where laws have a kink.
         pull = fibre_tension(effect.energy, _GIVEN) if isinstance(effect, PassiveFibres) else 0.0
         if not pull <= 0 and in_situ.among(case.effects) is None:
-            want = 'slack ones, as by an optimal_stretch of at least 1, or the effect "in_situ", which balances them'
+            want = 'slack fibres (an optimal_stretch of at least 1), or the effect "in_situ", which balances them'
             got = f"fibres under {1e3 * pull:.3g} kPa in the given shape"
             raise InputError(join(case.place, f"effect[{i}]"), got, want)
 
 
 def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, place: str) -> None:
-    """Check that bones have distinct names, contact is with some bones, and ``frames`` have an interval if time matters."""
+    """Check that bones have distinct names, contact is with at least one bone, and ``frames`` have an interval if time matters."""
     check_once(bones, join(place, "bone"))
     for i, effect in enumerate(acting):
         if isinstance(effect, Contact):
             check_used(bones, [(f"effect[{i}].bones", name) for name in effect.bones or ()], place)
             if effect.support is not None and in_situ.among(acting) is None:
                 got = f"{effect.support:g} mm"
-                raise InputError(join(place, f"effect[{i}].support"), got, 'it beside "in_situ" only')
+                raise InputError(join(place, f"effect[{i}].support"), got, 'no "support" without "in_situ"')
             if effect.friction is not None and in_situ.among(acting) is not None:
-                want = 'none beside "in_situ", which balances pressures at rest without friction'
+                want = 'no friction with "in_situ", which balances pressures at rest without friction'
                 raise InputError(join(place, f"effect[{i}].friction"), f"{effect.friction:g}", want)
         if isinstance(effect, Effect) and "interval" in effect.needs and frames.interval is None:
             want = f"the time from a frame number to the next, which effect[{i}] ({effect.title}) needs"

@@ -35,7 +35,7 @@ class Traced(Record):
 
 class KohoutKukacka(Record):
     """Fibres of a ``template`` in the unit cube, mapped to ``contours`` of the Laplace field between the attachments ``start``
-    and ``end``; fibres of the template "pennate" are inclined by ``pennation`` in the direction ``towards`` across the muscle.
+    and ``end``. Fibres of the template "pennate" are inclined by ``pennation`` in the direction ``towards`` across the muscle.
     """
 
     count: int = Field(gt=0, le=10_000)
@@ -69,7 +69,7 @@ class Chmd(Record):
 
 
 class FibreTurn(Record):
-    """A rotation about an ``axis``, right-handed, by an ``angle``."""
+    """A right-handed rotation about an ``axis`` by an ``angle``."""
 
     axis: Annotated[tuple[float, float, float], AfterValidator(partial(directed, name="an axis"))]
     angle: Angle

@@ -17,10 +17,10 @@ from fem_reference.scenes.muscle import MuscleCase
 def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "case") -> Case:
     """Make a case from the keys and tables of a ``case.toml`` (``cases/hip_flexion/case.toml`` explains each), without a file.
 
-    A ``table`` with a ``domain`` is the case of a scalar field, any other of a muscle. Instead of text with a unit, numbers in mm,
-    N, MPa, s, rad and tonne are accepted too. Effects may be made by :func:`fem_reference.make_effect`. ``candidate``, ``expect``
-    and ``negative_control`` may be left out. Files are named relative to ``folder``; pages show the ``name``. InputError for a
-    missing, unknown or wrong key names the key, the given value and the wanted one.
+    A ``table`` with a ``domain`` is the case of a scalar field; any other is the case of a muscle. Instead of text with a unit,
+    numbers in mm, N, MPa, s, rad and tonne are accepted too. Effects may be made by :func:`fem_reference.make_effect`.
+    ``candidate``, ``expect`` and ``negative_control`` may be left out. Files are named relative to ``folder``; pages show the
+    ``name``. An InputError for a missing, unknown or wrong key names the key, the given value and the expected value.
     """
     if not isinstance(table, Mapping) or not all(isinstance(key, str) for key in table):
         raise InputError("case", said(table), "keys and tables, as a case.toml has them")

@@ -111,8 +111,8 @@ class Rod(Record):
 
 
 class CaseBone(Record):
-    """A rigid body: a ``surface`` in a file with coordinates in ``unit``, or exactly one of the closed forms; it rests without
-    ``motion``. ``distance_error``: the allowed error of the distance to a surface, root mean square near it, before rounding.
+    """A rigid body: a ``surface`` in a file with coordinates in ``unit``, or exactly one of the closed forms; without ``motion``
+    it rests. ``distance_error``: the allowed error of the distance to a surface, root mean square near it, before rounding.
     ``distance_rounding``: the standard deviation of a Gaussian mean of this distance, as flat triangles prevent smooth sliding.
     """
 
@@ -133,17 +133,17 @@ class CaseBone(Record):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if (self.surface is None) != (self.unit is None):
-            raise ValueError('"unit" with "surface" and only with it')
+            raise ValueError('"unit" if and only if "surface" is given')
         for key, most in (("distance_error", 1.0), ("distance_rounding", 10.0)):
             if self.surface is None and key in self.model_fields_set:
-                raise ValueError(f'"{key}" beside "surface" only: a closed form has none')
+                raise ValueError(f'"{key}" only with "surface", as a closed form has none')
             if not _FINEST <= getattr(self, key) <= most:
                 raise ValueError(f'"{key}" from {_FINEST:g} to {most:g} mm')
         return self
 
 
 class CaseJoint(Record):
-    """A joint: the axis, right-handed, through a ``centre`` about which a ``bone`` turns; its angle is 0 at the first frame."""
+    """A joint: the right-handed ``axis`` through a ``centre`` about which a ``bone`` turns; its angle is 0 at the first frame."""
 
     name: Name
     bone: str
@@ -152,8 +152,8 @@ class CaseJoint(Record):
 
 
 class Muscle(Record):
-    """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often they are cut into eight.
-    ``mesher``: ``"quality"`` for good tetrahedra, or ``"block"`` for a box along the axes: a grid of boxes, each cut into six.
+    """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often each is cut into eight.
+    ``mesher``: ``"quality"`` for well-shaped tetrahedra, or ``"block"`` for a box along the axes: a grid of boxes cut into six.
     """
 
     surface: str
@@ -164,7 +164,7 @@ class Muscle(Record):
 
 
 class VertexList(Record):
-    """Vertices of the muscle surface from a CSV of ``vertex[,value]`` lines; with ``value`` only the lines with this value."""
+    """Vertices of the muscle surface from a CSV file with lines ``vertex[,value]``; with ``value``, only lines with this value."""
 
     file: str
     value: int | None = None
@@ -198,7 +198,7 @@ class Landmarks(Record):
 class Attachment(Record):
     """The part of the muscle surface that is attached to a bone, given by exactly one of ``vertices``, ``within`` (a distance from
     the bone) and ``outline``. Springs of a ``stiffness`` attach its area; without a stiffness it moves exactly with the bone.
-    Fibres that end beside it continue as a straight ``tendon`` to a point of the bone; it pulls only with the effect ``tendon``.
+    Fibres that end beside it continue to a point of the bone as a straight ``tendon``, which pulls only with the effect ``tendon``.
     """
 
     name: Name
@@ -231,12 +231,12 @@ class Frames(Record):
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """Every frame number wanted."""
+        """All requested frame numbers."""
         return tuple(range(self.first, self.last + 1, self.every))
 
 
 class Uncertain(Range):
-    """The range of a number of the case by its ``key``, such as ``effect[0].mu``, instead of the range stated by the effect."""
+    """The range of the number of the case at a ``key``, such as ``effect[0].mu``, instead of the range stated by the effect."""
 
     key: str
 
@@ -258,7 +258,7 @@ class DrivenCase(Case):
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """The frame numbers wanted."""
+        """The requested frame numbers."""
         return self.frames.numbers
 
 

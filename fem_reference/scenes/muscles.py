@@ -152,13 +152,13 @@ def exactly_attached[C: DrivenCase](case: C) -> C:
 
 
 def alone(table: dict[str, Any], place: str) -> dict[str, Any]:
-    """The ``table`` of a scene whose list has one muscle, rewritten as that of a single muscle; unchanged if it has several."""
+    """The ``table`` of a scene whose list has one muscle, rewritten as for a single muscle; unchanged if there are several."""
     listed = table.get("muscle")
     if not isinstance(listed, list) or len(listed) != 1 or not isinstance(listed[0], dict):
         return table
     muscle = {key: value for key, value in listed[0].items() if key not in (*BESIDE, "effect", "name")}
     own = {key: listed[0][key] for key in (*BESIDE, "effect") if key in listed[0]}
     for key in set(own) & set(table) - {"effect", "expect"}:
-        raise InputError(join(place, key), f"it, and muscle[0].{key}", "one of the two")
+        raise InputError(join(place, key), f"this key and muscle[0].{key}", "only one of these")
     lists = {key: [*table.get(key, []), *own.pop(key)] for key in ("effect", "expect") if key in own}
     return table | own | lists | {"muscle": muscle}

@@ -13,7 +13,7 @@ from fem_reference.scenes.case import Case
 
 
 def parts(key: str) -> list[str | int]:
-    """The parts of a ``key``, places in a list as numbers.
+    """The parts of a ``key``, with positions in a list as numbers.
 
     >>> parts("effect[0].ramp[1].amount")
     ['effect', 0, 'ramp', 1, 'amount']
@@ -59,7 +59,7 @@ def read(case: Case, key: str, value: str | float) -> float:
 
 
 def changed[C: Case](case: C, values: dict[str, float]) -> C:
-    """The ``case`` with other numbers by key, in their internal units; each number and the records around it are checked as in a
+    """The ``case`` with other numbers by key, in their internal units. Each number and the records around it are checked as in a
     scene file. :func:`fem_reference.scenes.casefile.with_numbers` also makes the checks across records.
     """
     for key, value in values.items():
@@ -92,7 +92,7 @@ def _in_file(field: Any, value: Any) -> Any:
 
 
 def title(case: Case, key: str) -> str:
-    """A ``key`` in words: effects and other entries by their names; ``neo_hooke mu`` for ``effect[0].mu``."""
+    """A ``key`` in words: effects and other entries by their names, such as ``neo_hooke mu`` for ``effect[0].mu``."""
     words = list[str]()
     for part, inside in zip(parts(key), _along(case, key)[1:], strict=True):
         if isinstance(inside, Effect):

@@ -12,7 +12,7 @@ from fem_reference.scenes.muscle import MuscleCase
 _OTHERS = re.compile(r"attachment\[\d+\]\.(stiffness|outline\.shift\.by)|fibres\.turned\.angle")
 _VARIED = (
     "a number of an effect, the stiffness or outline.shift.by of an attachment, or fibres.turned.angle: "
-    "the measured fibres, bones and frames of all runs are those of the case"
+    "the measured fibres, bones and frames of all runs are the same as in the case"
 )
 
 
@@ -52,9 +52,7 @@ def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, flo
     if one.spread == "log-uniform" and not low > 0:
         raise InputError(f"{place}.low", f'"{one.low}"', "more than zero, for a range of logarithms")
     if one.spread == "log-uniform" and not (own := numbers.number(case, key)) > 0:
-        raise InputError(
-            f"{place}.spread", f'"log-uniform" of {own:g}', '"uniform", as this has no logarithm in the case'
-        )
+        raise InputError(f"{place}.spread", f'"log-uniform" of {own:g}', '"uniform", as this number has no logarithm')
     return low, high
 
 

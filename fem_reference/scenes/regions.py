@@ -12,7 +12,7 @@ from fem_reference.foundations.units import Length, LengthUnit, PositiveLength
 
 
 class LengthFromAttachment(Record):
-    """The part within a ``length`` of the patch of an attachment, by its ``name``."""
+    """The part within a ``length`` of the attached patch of the attachment ``name``."""
 
     name: str
     length: PositiveLength
@@ -43,7 +43,7 @@ class LabelledTets(Record):
 
 
 class ShareOfField(Record):
-    """The part in which the Laplace field, 0 on the attachment ``start`` and 1 on ``end``, is from ``first`` to ``last``."""
+    """The part in which the Laplace field, 0 on the attachment ``start`` and 1 on ``end``, is between ``first`` and ``last``."""
 
     start: str
     end: str
@@ -55,8 +55,8 @@ class ShareOfField(Record):
 
 class CaseRegion(Record):
     """A part of the muscle at rest in which effects act (``in``), given by exactly one of ``attachment``, ``patch``, ``surface``,
-    ``tets`` and ``field``. The share of a point in it grows from 0 at its border to 1 at a depth of ``width``. Regions of one name
-    are united.
+    ``tets`` and ``field``. The share of a point in the region grows from 0 at the border to 1 at a depth of ``width``. Regions
+    with the same name are united.
     """
 
     name: Name

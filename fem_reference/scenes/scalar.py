@@ -27,7 +27,7 @@ class Interval(Record):
 
 
 class MeshFiles(Record):
-    """Triangles in the format of listing 4.5: comma separated files without a header.
+    """Triangles in the format of listing 4.5: comma-separated files without a header.
 
     ``points``: a row of 2 or 3 coordinates for each vertex; ``triangles``: a row of three vertices, counted from 1, for each
     triangle, or the word ``delaunay`` for a triangulation of points in the plane.
@@ -59,7 +59,7 @@ class Boundary(Record):
     """A boundary condition, in one of two forms.
 
     The first form is ``on`` an end of an interval or the ``rim`` of triangles: the ``value`` of the field (Dirichlet) or its
-    ``slope`` along the outward normal (Neumann). A formula ``where`` limits it to the facets at whose vertices it is above zero.
+    ``slope`` along the outward normal (Neumann). A formula ``where`` limits it to facets at whose vertices its value is above zero.
     The second form is ``bounds``, a file in the format of listing 4.5: a row of vertices, counted from 1, and a row of their fixed
     values. On all other parts of the boundary the slope is 0.
     """
@@ -75,7 +75,7 @@ class Boundary(Record):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.bounds is not None and (self.where, self.value, self.slope) != (None, None, None):
-            raise ValueError('"bounds" alone: its file says where and what')
+            raise ValueError('"bounds" alone, as its file states vertices and values')
         if self.on is not None and (self.value is None) == (self.slope is None):
             raise ValueError('exactly one of "value" and "slope"')
         return self

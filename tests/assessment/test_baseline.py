@@ -24,19 +24,19 @@ DAMAGE = {
     ),
     "no statistic": (
         lambda path: edited(path, lambda t: t["measures"].update({"mass.sum": t["measures"]["volume.deviation"]})),
-        "measures.mass.sum: got one in .*want an existing statistic",
+        "measures.mass.sum: got a statistic in .*want an existing statistic",
     ),
     "unit": (
         lambda path: edited(path, lambda t: t["measures"]["volume.deviation"].update(unit="mm")),
-        'measures.volume.deviation: got one in "mm", want an existing statistic, in %',
+        'measures.volume.deviation: got a statistic in "mm", want an existing statistic, in %',
     ),
     "values": (
         lambda path: edited(path, lambda t: t["measures"]["volume.deviation"]["values"].pop()),
-        "volume.deviation.values: got 2 values, want 3, one a frame",
+        "volume.deviation.values: got 2 values, want 3, one per frame",
     ),
     "positions": (
         lambda path: edited(path, lambda t: t["positions"]["values"][1].pop()),
-        "positions.values: got another number of them, want 64 vertices in each of 3 frames",
+        "positions.values: got a different number of positions, want 64 vertices in each of 3 frames",
     ),
     "case": (lambda path: edited(path, lambda t: t.update(case="cube")), 'case: got "cube", want "ball"'),
     "candidate": (lambda path: edited(path, lambda t: t.update(candidate="x")), 'candidate: got "x", want "mine"'),
@@ -118,7 +118,7 @@ def test_a_file_that_is_damaged_or_somebody_elses_is_neither_read_nor_written_ov
 
 def test_other_frames_are_reported(path) -> None:
     path.write_text(path.read_text().replace("[0, 10, 20]", "[0, 10, 30]"))
-    with pytest.raises(InputError, match="frames: got 3 numbers, not all of the scene, want its frame numbers"):
+    with pytest.raises(InputError, match="frames: got 3 numbers that differ from the scene's, want its frame numbers"):
         baseline.read(path, SCENE, "mine")
 
 

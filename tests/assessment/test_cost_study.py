@@ -82,5 +82,5 @@ def test_a_file_is_read_back_whole(tmp_path: Path) -> None:
     path.write_text(json.dumps(facts(given, {"machine": "here"})))
     assert list(map(vars, load(path))) == [vars(given)]
     path.write_text("[]")
-    with pytest.raises(InputError, match=r"got \[\], want a study as the verb study writes it"):
+    with pytest.raises(InputError, match=r"got \[\], want a study written by the verb study"):
         load(path)

@@ -155,8 +155,8 @@ def test_a_remark_has_the_values_of_coarser_meshes_and_the_source() -> None:
     one = replace(
         measured(1.02), finding=Finding(1.02, ladder=((2.0, 1.04), (1.0, 1.02)), note="Twice the load steps.")
     )
-    assert of_result(one).remark == "Cells of 2 mm give 1.04. Twice the load steps. Beside: by hand."
-    assert of_result(measured(1.02)).remark == "Beside: by hand."
+    assert of_result(one).remark == "Cells of 2 mm give 1.04. Twice the load steps. Compared with: by hand."
+    assert of_result(measured(1.02)).remark == "Compared with: by hand."
 
 
 def test_a_remark_counts_the_poses_in_which_the_published_arm_is_known() -> None:
@@ -234,7 +234,7 @@ def test_stated_bars_are_those_of_the_page_of_error_bars() -> None:
     assert f"the mean stress along the fibres is {value} ± {bar} kPa" in " ".join(said.split())
     assert f"`{where}`" in said
     assert {bar for name, bar in stated.items() if name not in (*columns, "Stress")} == {
-        "by --error-bar, by case",
+        "measured by --error-bar for each case",
         "none: cubes are homogeneous",
     }
 

@@ -42,7 +42,7 @@ def test_a_line_around_a_circle_has_its_radius() -> None:
 
 
 def test_too_few_angles_are_refused() -> None:
-    with pytest.raises(InputError, match="more than 4 that differ"):
+    with pytest.raises(InputError, match="want more than 4"):
         fitted_arms(np.array([0.0, 10, 20, 30, 30]), np.ones((5, 1)), np.array([0.0]))
 
 

@@ -118,7 +118,7 @@ def test_nothing_is_said_where_the_bar_reaches_both_sides_of_what_is_allowed(pat
     assert (judged.frame, judged.known) == (20, BAR)
     edited(path, lambda table: table["measures"][name].update(within=12.1))
     why = asked(checked(path, current(known=bars())), "within", name).why
-    assert why == "the reference has an error bar of 0.5 mm, and 12 mm is within it of the 12.1 mm allowed"
+    assert why == "the reference has an error bar of 0.5 mm; 12 mm differs from the allowed 12.1 mm by less"
 
 
 def test_an_edited_tolerance_below_rounding_says_nothing(path) -> None:
@@ -172,7 +172,7 @@ def test_notes_say_what_else_is_different(path) -> None:
         baseline.read(path, SCENE, "mine"), CurrentMeasures.of(SCENE, SETUP, run("mine", SHIFTS), other, bars())
     )
     assert "measured by fem_reference" in check.notes[0]
-    assert check.notes[1] == "the reference is test, that of the baseline was fenicsx-1"
+    assert check.notes[1] == "the reference is test, but the reference of the baseline was fenicsx-1"
     assert "no sampled vertex moved, but measures changed" in check.notes[2]
 
 

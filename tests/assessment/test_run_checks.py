@@ -147,8 +147,8 @@ def test_a_turn_takes_steps_enough(tmp_path, last, steps, met) -> None:
     lid = replace(problem.bones[1], motion=Turn((0, 0, 1), (5, 5, 0), (0.0, last), (0.0, 2 * np.pi)))
     problem = replace(problem, bones=(problem.bones[0], lid))
     run = resting(problem, load_steps=np.array([0.0, steps, steps, steps, steps]))
-    assert ("lid turns by load step" in lost(problem, run)) is not met
-    (check,) = (one for one in of_muscle(problem, run) if one.name == "lid turns by load step")
+    assert ("lid turns per load step" in lost(problem, run)) is not met
+    (check,) = (one for one in of_muscle(problem, run) if one.name == "lid turns per load step")
     assert_allclose(check.value, 2 * np.pi / (steps if last == 2 else 4 * steps))
 
 
@@ -157,7 +157,7 @@ def test_there_and_back_counts_twice(tmp_path) -> None:
     lid = replace(problem.bones[1], motion=Turn((0, 0, 1), (5, 5, 0), (0.0, 1.0, 2.0), (0.0, np.pi, 0.0)))
     problem = replace(problem, bones=(problem.bones[0], lid))
     run = resting(problem, load_steps=np.array([0.0, 2, 1, 1, 1]))
-    assert lost(problem, run) == ["lid turns by load step"]
+    assert lost(problem, run) == ["lid turns per load step"]
 
 
 def test_forces_that_are_not_in_balance(tmp_path) -> None:

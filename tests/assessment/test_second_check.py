@@ -77,7 +77,7 @@ def test_a_denied_run_is_no_truth_anywhere(tmp_path, monkeypatch, capsys) -> Non
     assert (facts["verdict"], facts["status"]) == ("pass", "converged")
     record = facts["second_check"]
     assert all(one["met"] for one in record["checks"])
-    assert {"lid turns by load step", "residual force", "residual moment"} <= {one["name"] for one in record["checks"]}
+    assert {"lid turns per load step", "residual force", "residual moment"} <= {one["name"] for one in record["checks"]}
     (folder,) = (out / "runs").glob("fenicsx-*")
     # Two frames of the stored run in each other's place; its record is of another check, so that it is asked again.
     frames = [folder / "surface" / f"frame_{number:04d}.vtp" for number in (5, 10)]

@@ -41,13 +41,13 @@ def dropped() -> np.ndarray:
 @pytest.mark.parametrize(
     ("last", "why"),
     [
-        (MOVED[1] * 1e6, "exploded: a vertex is "),  # finite, as the numbers of a solver that explodes
+        (MOVED[1] * 1e6, "exploded: a vertex of a body of "),  # finite, as the numbers of a solver that explodes
         (MOVED[1] * 1.3, "exploded: 2.2 times the volume of the reference in frame 10"),  # 1.3^3
         (flattened(), "collapsed: 0.4 times the volume of the reference in frame 10"),
         (turned(), "inside out: "),
         (dropped(), "stuck: "),
         (MOVED[1] / 1000, "collapsed: 1e-09 times"),  # metres for millimetres, beyond the first frame
-        (MOVED[1] * 1000, "exploded: a vertex is "),
+        (MOVED[1] * 1000, "exploded: a vertex of a body of "),
     ],
 )
 def test_frames_that_are_no_answer_are_named(last, why: str) -> None:
@@ -58,7 +58,7 @@ def test_what_is_only_wrong_is_sound() -> None:
     for last in (MOVED[1], MOVED[1] + [5.0, 0, 0], MOVED[1] * 1.2, MOVED[1] * [1, 1, 0.6], REST.points + 1e-4):
         assert unsound(run(last), TRUTH) == ""
     frozen = run(REST.points)
-    assert unsound(frozen, TRUTH).startswith(f"stuck: {len(REST.points)} vertices never move, by up to 3 mm")
+    assert unsound(frozen, TRUTH).startswith(f"stuck: {len(REST.points)} vertices never move, but by up to 3 mm")
     assert unsound(frozen, run(REST.points + [1e-2, 0, 0])) == ""  # the reference rests too
     lost = run(MOVED[1] * NAN)
     assert unsound(lost, TRUTH) == unsound(run(MOVED[1] * 1e6), lost) == ""  # statuses and statistics say so
@@ -73,7 +73,7 @@ def test_a_run_that_says_it_converged_without_a_frame_is_no_answer() -> None:
 def test_lines_without_a_surface_are_an_answer() -> None:
     lines = replace(run(MOVED[1]), has_surface=False, positions=np.full_like(MOVED, NAN))
     assert unsound(lines, TRUTH) == ""
-    assert unsound(replace(lines, has_surface=True), TRUTH) == "unknown: no frame without values that are not numbers"
+    assert unsound(replace(lines, has_surface=True), TRUTH) == "unknown: every frame has values that are not numbers"
 
 
 def test_it_is_not_ranked_and_named_on_the_page(tmp_path, monkeypatch) -> None:

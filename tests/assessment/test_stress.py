@@ -21,8 +21,8 @@ def test_judging() -> None:
         for most in (2.0, 4.0)
     )
     assert (shown.verdict, kept.verdict) == ("degraded", "failed")
-    assert shown.sentence.startswith("as it should be, for there is no pressure: volume 3 %")
-    assert kept.sentence.startswith("though it should not be, for there is no pressure: volume 3 %")
+    assert shown.sentence.startswith("as expected (there is no pressure): volume 3 %")
+    assert kept.sentence.startswith("not as expected (there is no pressure): volume 3 %")
     assert stress.doubted(blank, "", "it is flat") is blank
     assert [stress.doubted(blank, "unstable", why).verdict for why in ("", "it is flat")] == ["degraded", "no solution"]
     assert stress.doubted(shown, "unstable", "it is flat") is shown

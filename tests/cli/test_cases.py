@@ -80,10 +80,10 @@ def test_it_is_compared_studied_recommended_and_stressed(command, capsys, monkey
         (["compare", "./bar", "--solver", "pbd", "--solver-command", "OWN"], '--candidate: got "pbd" twice'),
         (
             ["page", "error-bars", "--solver-command", "OWN"],
-            "page: got --solver-command for error-bars, want it for table-5-1 only",
+            "page: got --solver-command for error-bars, want this option for table-5-1 only",
         ),
-        (["compare", "./bar", "--set", "candidate[0].solver=command"], "a scene file runs no program"),
-        (["run", "./bar", "--set", "reference.solver=command"], "a scene file runs no program"),
+        (["compare", "./bar", "--set", "candidate[0].solver=command"], "a scene file cannot run a program"),
+        (["run", "./bar", "--set", "reference.solver=command"], "a scene file cannot run a program"),
         (["compare", "./bar", "--solver", "command"], "command: got nothing, want this key"),
     ],
 )

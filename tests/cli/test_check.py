@@ -181,7 +181,7 @@ def test_bad_input_is_reported_before_anything_is_solved(work, capsys) -> None:
 def test_another_scene_is_not_this_baseline(work, capsys) -> None:
     assert work.check("--set", "muscle.tet_size=7 mm") == cli.BAD_INPUT
     assert (
-        "want the key of this scene (it was changed since; --update takes the current measures)"
+        "want the key of this scene (it has changed since then; --update stores the current measures)"
         in capsys.readouterr().err
     )
 

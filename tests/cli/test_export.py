@@ -53,8 +53,8 @@ def test_a_run_without_states_is_not_solved_again_unless_asked(solved, capsys, t
     words = solved(kept=())
     assert cli.main(words) == cli.BAD_INPUT
     said = capsys.readouterr().err
-    assert "a reference that was solved before without its states" in said
-    assert "want --solve, which solves it again (that took 22 min)" in said
+    assert "a reference that was solved without storing the states" in said
+    assert "want --solve, which solves it again (the last time in 22 min)" in said
     assert not (tmp_path / "paraview").exists()
     assert cli.main([*words, "--solve"]) == cli.BROKEN  # it begins to, which the fixture forbids
     assert "it is solved again" in capsys.readouterr().err
@@ -62,7 +62,7 @@ def test_a_run_without_states_is_not_solved_again_unless_asked(solved, capsys, t
 
 def test_states_of_some_frames_are_not_taken_for_those_of_all(solved, capsys) -> None:
     assert cli.main(solved(kept=(0, 5))) == cli.BAD_INPUT
-    assert "without its states" in capsys.readouterr().err
+    assert "without storing the states" in capsys.readouterr().err
 
 
 @pytest.mark.slow

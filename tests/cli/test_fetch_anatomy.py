@@ -27,9 +27,9 @@ def test_what_is_missing_and_what_can_be_solved_is_said(given: Path, tmp_path: P
     assert cli.main(["fetch-anatomy", str(given), "--to", str(to), "--json", str(facts)]) == 0
     assert capsys.readouterr().out.splitlines() == [
         f"{to}: 1 of 4 files found, by their content",
-        "missing, of those that are published as they are: box/b",
-        "missing, cleaned, converted or computed, which copying cannot provide: 2 in hip",
-        "cases that can be solved with it: none",
+        "missing files that are published in this form: box/b",
+        "missing files that were cleaned, converted or computed, not published: 2 in hip",
+        "cases that can be solved with them: none",
         "licence: for no trade",
         f"export FEM_REFERENCE_DATA='{to}'",
     ]

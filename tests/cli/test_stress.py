@@ -20,8 +20,11 @@ for frame in (0, 5, 10, 15, 20):
     ("words", "got"),
     [
         (["--jitters", "-1"], "--jitters: got -1, want 0 or more"),
-        (["--steps", "--solver", "pbd"], "--steps: got it with pbd alone, want --solver fenicsx too"),
-        (["--jitters", "2", "--solver", "pbd", "--solver", "arap"], "--jitters: got it with pbd, arap alone, want"),
+        (["--steps", "--solver", "pbd"], "--steps: got this option with pbd alone, want --solver fenicsx too"),
+        (
+            ["--jitters", "2", "--solver", "pbd", "--solver", "arap"],
+            "--jitters: got this option with pbd, arap alone, want",
+        ),
     ],
 )
 def test_runs_of_the_reference_that_nobody_would_make_are_refused(words, got, tmp_path, capsys) -> None:

@@ -303,7 +303,7 @@ def test_an_unsolved_case_says_where_and_why_and_keeps_what_it_reached(name, tmp
 def test_a_negative_control_that_turns_nothing_says_so(tmp_path, capsys) -> None:
     # It changes a candidate, which run does not judge.
     words = ["rod", "--negative-control", "--out", str(tmp_path), "--quiet"]
-    said = "negative control: the verdict is pass and should be fail"
+    said = "negative control: the verdict is pass but should be fail"
     assert cli.main(["run", *words]) == cli.DONE
     assert said in capsys.readouterr().out
     for verb in (["compare"], ["run", "--solver", "listing"]):

@@ -164,7 +164,7 @@ def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
             "pressure",
             "ramp",
             [*RAMP, {"frame": 30, "amount": 1.0}],
-            r"ramp: .*want knots whose frames are each later",
+            r"ramp: .*want knots in the order of their frames",
         ),
         ("pressure", "ramp", [{"frame": 0}], r"ramp\[0\]\.amount: got nothing, want this key"),
     ],

@@ -18,7 +18,7 @@ from fem_reference.io.formats import formats, vtk
 
 WRITTEN_BY_US = [suffix for suffix, one in formats().items() if one.write]
 BALL = shapes.sphere(2, 30.0)  # 162 vertices that float32 cannot hold, 320 triangles
-UNREADABLE = f"want a triangle surface, whole, as {' '.join(formats())}"
+UNREADABLE = f"want a complete triangle surface as {' '.join(formats())}"
 
 # Every format and kind of it, written by meshio, and how far its coordinates may be from ours [mm]: nothing where it
 # holds float64 or all its digits, and half a unit in the last place of float32 at 30 mm (1e-6) for binary STL.
@@ -160,10 +160,10 @@ def test_a_cut_obj_is_refused_where_the_cut_shows(written: Path, tmp_path: Path)
     faces = text.index("\nf ")
     for stop, got in (
         (0, "no triangles"),
-        (text.index("v ") + 8, "a position of fewer than three coordinates"),
+        (text.index("v ") + 8, "a position with fewer than three coordinates"),
         (faces, "no triangles"),
-        (faces + 4, "a polygon of 1 corners"),
-        (text.rstrip().rindex(" "), "a polygon of 2 corners"),
+        (faces + 4, "a polygon with 1 corners"),
+        (text.rstrip().rindex(" "), "a polygon with 2 corners"),
     ):
         path.write_text(text[:stop])
         with pytest.raises(InputError, match=f"got {got}"):
@@ -228,20 +228,20 @@ LIST_PLY = (
 @pytest.mark.parametrize(
     ("name", "text", "got"),
     [
-        ("quad.vtk", polydata(QUAD), "a polygon of 4 corners"),
-        ("strip.vtk", polydata(QUAD, "TRIANGLE_STRIPS"), "PolyData that is not made of triangles"),
+        ("quad.vtk", polydata(QUAD), "a polygon with 4 corners"),
+        ("strip.vtk", polydata(QUAD, "TRIANGLE_STRIPS"), "PolyData with cells other than triangles"),
         (
             "grid.vtk",
             "# vtk DataFile Version 3.0\n\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\n",
             "a VTK file of STRUCTURED_POINTS",
         ),
-        ("quad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", "a polygon of 4 corners"),
-        ("quad.off", "OFF 4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n", "a polygon of 4 corners"),
-        ("quad.ply", f"{PLY_TEXT}element face 1\n{CORNERS}4 0 1 2 3\n", "a polygon of 4 corners"),
+        ("quad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", "a polygon with 4 corners"),
+        ("quad.off", "OFF 4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n", "a polygon with 4 corners"),
+        ("quad.ply", f"{PLY_TEXT}element face 1\n{CORNERS}4 0 1 2 3\n", "a polygon with 4 corners"),
         ("mixed.ply", f"{PLY_TEXT}element face 2\n{CORNERS}3 0 1 2\n4 0 1 2 3\n", "polygons of different sizes"),
         ("none.ply", f"{PLY_TEXT}element face 0\n{CORNERS}", "no triangles"),
-        ("cloud.ply", f"{PLY_TEXT}end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n", "no vertices with faces"),
-        ("short.off", "OFF 3 1 0\n0 0 0\n1 0 0\n0 1\n3 0 1 2\n", "a position of fewer than three coordinates"),
+        ("cloud.ply", f"{PLY_TEXT}end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n", "no vertices or no faces"),
+        ("short.off", "OFF 3 1 0\n0 0 0\n1 0 0\n0 1\n3 0 1 2\n", "a position with fewer than three coordinates"),
         ("huge.obj", f"v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 {10**30}\n", "Python int too large"),
         ("huge.off", f"OFF 3 1 0\n0 0 0\n1 0 0\n1 1 0\n3 0 1 {10**30}\n", "Python int too large"),
         ("empty.obj", "f 1 2 3\n", "no vertices"),

@@ -149,7 +149,7 @@ class Called(Record):
 @pytest.mark.parametrize("file", ["", ".", "..", ".a", "a/b", "a b", "a\\b", "a\n", "é" * 101, "a:b"])
 def test_what_is_no_name_of_a_file_is_refused(file: str) -> None:
     with pytest.raises(
-        InputError, match=r"file: got .*want a name of 1 to 100 letters, digits and \. _ -, with no dot first"
+        InputError, match=r"file: got .*want a name of 1 to 100 letters, digits and \. _ -, without a dot at its start"
     ):
         parse(Called, {"file": file}, "record")
 

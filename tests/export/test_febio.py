@@ -221,7 +221,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     [
         (
             {"effect[0]": {"name": "fibre_active", **acting.PARAMETERS["fibre_active"]}},
-            r'effect\[0\]: got "fibre_active", want what FEBio has in the same form: neo_hooke',
+            r'effect\[0\]: got "fibre_active", want an effect that FEBio has in the same form: neo_hooke',
         ),
         ({"effect[0]": {"name": "contact", "stiffness": "1 kPa/mm"}}, "effect: got no matrix: neither neo_hooke"),
         ({"effect[1]": {"name": "contact", "stiffness": "1 kPa/mm"}}, "effect: got neither incompressible nor"),

@@ -58,7 +58,7 @@ def test_an_overlap_at_rest_presses_with_no_more_than_the_matrix_bears(deep: flo
     assert radius(problem) == pytest.approx(wanted, rel=1e-12)
     said = febio_contact.notes(problem)
     assert len(said) == (deep > 0)
-    assert all(f"{deep:.2g} mm inside" in text and f"search_radius is {wanted:.2g} mm" in text for text in said)
+    assert all(f"{deep:.2g} mm inside" in text and f"search_radius of {wanted:.2g} mm" in text for text in said)
 
 
 @pytest.mark.parametrize("friction", [None, 0.3])
@@ -164,9 +164,9 @@ def test_a_point_without_area_has_no_spring(springs: MuscleProblem) -> None:
 def test_springs_beside_those_of_the_reference_are_said_with_how_stiff_they_are(springs: MuscleProblem) -> None:
     """0.1 MPa/mm over 40 mm2, and 40 more of which two thirds are attached: half a triangle with one corner at nothing."""
     first, measured = febio_contact.notes(springs)
-    assert 'attachment "top": springs at the nearest points of the tetrahedra, 0.25 mm (mean) to 0.2' in first
-    assert "6.667 N/mm in all for 6.667, their middle 0.25 mm away" in first
-    low, high = map(float, first.partition("mm away, ")[2].split(" times")[0].split(" to "))
+    assert 'attachment "top": springs act at the nearest points of the tetrahedra, 0.25 mm (mean) to 0.2' in first
+    assert "Their stiffness is 6.667 instead of 6.667 N/mm, their centre is 0.25 mm away" in first
+    low, high = map(float, first.partition("and they are ")[2].split(" times")[0].split(" to "))
     assert 0.98 < low <= high < 1.02
     assert "has not run springs at points" in measured
     assert "5.3 and 8.8 % of the force" in measured
@@ -194,7 +194,7 @@ def test_the_file_says_it_whatever_the_name(springs: MuscleProblem) -> None:
         springs.mesh, facets={"bottom": springs.mesh.facets["bottom"], "a--b -->": springs.mesh.facets["top"]}
     )
     named = replace(springs, attached=(top,), mesh=mesh, attached_skins={"a--b -->": springs.attached_skins["top"]})
-    assert any("a- -b - ->" in text and "6.667 N/mm in all for 6.667" in text for text in comments(named))
+    assert any("a- -b - ->" in text and "6.667 instead of 6.667 N/mm" in text for text in comments(named))
 
 
 @pytest.mark.slow
@@ -204,7 +204,7 @@ def test_the_terminal_and_the_page_beside_the_file_say_it(tmp_path: Path, capsys
     changes = ["--set", "muscle.tet_size=9 mm", "--set", "attachment[1].stiffness=100 kPa/mm"]
     assert cli.main([*words, *changes, "--to", str(tmp_path / "springs")]) == cli.DONE
     said = capsys.readouterr().err
-    assert 'FEBio\'s model differs: attachment "insertion": springs at the nearest points' in said
+    assert 'FEBio\'s model differs: attachment "insertion": springs act at the nearest points' in said
     assert "5.3 and 8.8 % of the force" in said
     readme = (tmp_path / "springs" / "FEBIO.md").read_text()
     sentences = [line.split("model differs: ")[1] for line in said.splitlines() if "model differs" in line]

@@ -78,7 +78,7 @@ def test_a_contact_surface_without_facets_is_refused(bar: MuscleProblem) -> None
     outer = boundary(bar.mesh.tets)[0]
     nowhere = replace(bar, mesh=replace(bar.mesh, facets={"bottom": outer, "top": outer[:1]}))
     with pytest.raises(
-        InputError, match=r"contact: got no facet of the tetrahedra farther than 0\.41 mm from what is att"
+        InputError, match=r"contact: got no facet of the tetrahedra farther than 0\.41 mm from attached parts"
     ):
         febio.model(nowhere)
 

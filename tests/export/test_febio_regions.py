@@ -129,7 +129,7 @@ def test_fibres_of_two_laws_that_febio_has_as_one_are_refused() -> None:
         law("fibre_passive_febio", "tendon", **given),
         law("fibre_passive_febio", "not tendon", **given | {"c4": 1.5}),
     )
-    with pytest.raises(InputError, match="fibre_passive_febio of different c4 or linear_from"):
+    with pytest.raises(InputError, match="fibre_passive_febio with different c4 or linear_from"):
         febio.check(case.model_copy(update={"effect": (*case.effect, *two)}))
     (part, *_) = febio_regions.parts(tendinous(two[0], two[0].model_copy(update={"region": "not tendon"})))
     assert sum(one.c3 for one in part.effects if isinstance(one, FibrePassiveFebio)) == pytest.approx(two[0].c3)

@@ -213,7 +213,7 @@ def test_the_folder_must_be_free_and_options_fit_the_format(compared, tmp_path, 
     with pytest.raises(InputError, match="which is not empty"):
         paraview.write(compared[0], tmp_path)
     assert cli.main(["export", "box_squeeze", "--to", str(tmp_path / "to"), "--candidate", "pbd"]) == cli.BAD_INPUT
-    assert "them for paraview only" in capsys.readouterr().err
+    assert "these options for paraview only" in capsys.readouterr().err
 
 
 def test_blender_is_given_every_vertex_in_every_frame(compared, exported, tmp_path, monkeypatch) -> None:
@@ -286,7 +286,7 @@ def test_in_situ_no_pressure_is_shown_that_knows_nothing_of_rest(tmp_path: Path)
     tense = '[[effect]]\nname = "in_situ"\nstretch = 1.1\n'
     _, _, arrays = exported_with(tmp_path, f"[[bone]]\n{WALL}", tense + CONTACT)
     assert ("distance_to_bones" in arrays, "contact_pressure" in arrays) == (True, False)
-    assert "not there with `in_situ`" in (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
+    assert "missing with `in_situ`" in (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
 
 
 def test_the_worst_corner_of_a_bent_tetrahedron_is_the_least() -> None:

@@ -158,10 +158,10 @@ FAN = np.array([*TET_FACES, [1, 2, 4], [2, 1, 4]])
 UNUSABLE = {
     "no triangles": (CORNER, np.zeros((0, 3), int)),
     r"not finite \(vertex 2\)": (np.where(np.arange(4)[:, None] == 2, np.nan, CORNER), TET_FACES),
-    "vertex that does not exist, want 0 to 2": (CORNER[:3], TET_FACES),
+    "vertex that does not exist, want vertices from 0 to 2": (CORNER[:3], TET_FACES),
     "a triangle with a vertex that does not exist": (CORNER, TET_FACES - 1),
-    "3 edges of one triangle only, the first at": (CORNER, TET_FACES[1:]),
-    "edges of more than two triangles": (
+    "3 edges that belong to only one triangle, the first at": (CORNER, TET_FACES[1:]),
+    "edges that belong to more than two triangles": (
         np.concatenate([CORNER, CORNER[:1] + 2]),
         np.array([*FAN, [1, 4, 3], [3, 4, 1]]),
     ),

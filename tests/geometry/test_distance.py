@@ -70,9 +70,9 @@ def test_where_squares_overflow_everything_is_far() -> None:
 def test_what_is_not_finite_has_no_distance(bad: float) -> None:
     points = np.ones((3, 3))
     points[1, 2] = bad
-    with pytest.raises(ValueError, match="distances: points that are not finite"):
+    with pytest.raises(ValueError, match="distances: the points are not all finite"):
         distances(points, CUBE)
-    with pytest.raises(ValueError, match="distances: points of the surface that are not finite"):
+    with pytest.raises(ValueError, match="distances: the points of the surface are not all finite"):
         distances(np.ones((1, 3)), Surface(points, np.array([[0, 1, 2]])))
 
 

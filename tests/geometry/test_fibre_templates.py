@@ -155,5 +155,5 @@ def test_fibres_of_a_template_never_cross() -> None:
 
 def test_what_cannot_be_is_an_error() -> None:
     field = fibre_field(_prism(), "bottom", "top")
-    with pytest.raises(InputError, match=r"kohout_kukacka\.towards.*one across it"):
+    with pytest.raises(InputError, match=r"kohout_kukacka\.towards.*a direction across the muscle"):
         contours(field, 20, np.array([0.0, 0.0, 1.0]))

@@ -137,7 +137,8 @@ def test_attachments_that_touch_still_give_fibres() -> None:
 
 def test_more_fibres_than_there_is_room_for() -> None:
     with pytest.raises(
-        InputError, match=r"fibres\.traced\.count: got 5000, want at most \d+, the fibres that could be traced"
+        InputError,
+        match=r"fibres\.traced\.count: got 5000, want at most \d+, the number that could be traced",
     ):
         trace(_bar(2), "bottom", "top", 5000)
 

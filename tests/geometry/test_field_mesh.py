@@ -94,9 +94,9 @@ def test_stabilisation_turns_with_the_mesh_and_does_without_flow() -> None:
     [
         ([[0.0], [np.nan]], [[0, 1]], "not a finite number"),
         ([[0.0], [1e200]], [[0, 1]], "a coordinate beyond 1e"),
-        ([[0.0], [1.0]], [[0, 2]], "outside of 1 to 2"),
+        ([[0.0], [1.0]], [[0, 2]], "outside 1 to 2"),
         ([[0.0], [1.0], [2.0]], [[0, 1]], "vertex 3 in no cell"),
-        ([[0.0, 0], [1, 0], [2, 0]], [[0, 1, 2]], "cell 1 without extent"),
+        ([[0.0, 0], [1, 0], [2, 0]], [[0, 1, 2]], "cell 1 of size zero"),
         (
             [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]],
             [[0, 1, 2], [0, 1, 3], [0, 1, 4]],

@@ -157,7 +157,7 @@ def test_lines_that_leave_beside_the_end_do_not_count() -> None:
     assert_allclose(lines[:, -1, 2], 50, atol=1e-9)
     assert lines[:, 0, 0].max() < 5
     beside = replace(straight, slopes=np.broadcast_to([0.01, 0, 0.01], straight.slopes.shape))
-    with pytest.raises(InputError, match="got 4, want at most 0, the fibres that could be traced"):
+    with pytest.raises(InputError, match="got 4, want at most 0, the number that could be traced"):
         streamlines(beside, 4)
 
 
@@ -166,5 +166,5 @@ def test_too_many() -> None:
         streamlines(area_flux(bar(), "bottom", "top"), MOST + 1)
     still = area_flux(bar(), "bottom", "top")
     still = Flow(still.mesh, still.start, still.end, still.faces, still.rises, 0 * still.slopes)
-    with pytest.raises(InputError, match="got 4, want at most 0, the fibres that could be traced"):
+    with pytest.raises(InputError, match="got 4, want at most 0, the number that could be traced"):
         streamlines(still, 4)

@@ -211,7 +211,7 @@ def test_triangles_may_have_any_orientation(ball: Grid) -> None:
 
 
 def test_what_bounds_no_body() -> None:
-    with pytest.raises(InputError, match=r"edges of one triangle only, .* want a closed surface"):
+    with pytest.raises(InputError, match=r"edges that belong to only one triangle, .* want a closed surface"):
         build(Surface(BALL.points, BALL.triangles[1:], "ball"), 1.0, 4.0)
     with pytest.raises(InputError, match="ball: got a triangle with a vertex that does not exist"):
         build(Surface(BALL.points[1:], BALL.triangles, "ball"), 1.0, 4.0)
@@ -233,7 +233,7 @@ def test_resolve_stops_at_the_largest_grid_and_says_so(monkeypatch, caplog) -> N
     with caplog.at_level(logging.WARNING):
         grid = resolve(CUBE, 1e-3, 2.0)
     assert grid.mean_error > 1e-3
-    assert "wanted 0.001 mm" in caplog.text
+    assert "instead of 0.001 mm" in caplog.text
     # One halving more would be more than twice as fine along each axis and eight times as many nodes, less the rim.
     assert 200_000 / 9 < grid.coefficients.size < 1.3 * 200_000
 
@@ -281,7 +281,7 @@ def test_damaged_files_are_made_anew(counted: list[float], tmp_path: Path, caplo
     path.write_bytes({"cut": whole[:-300], "empty": b"", "text": b"not a grid", "bit": bytes(flipped)}[damage])
     again = cached(BALL, 0.1, 2.0, 0.0, tmp_path)
     assert len(counted) == 2
-    assert "damaged, made anew" in caplog.text
+    assert "damaged and are made again" in caplog.text
     cached(BALL, 0.1, 2.0, 0.0, tmp_path)
     assert len(counted) == 2
     assert np.isfinite(again.coefficients).all()

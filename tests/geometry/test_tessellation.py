@@ -92,5 +92,5 @@ def test_another_body_has_no_triangles() -> None:
         def sample(self, points: Floats) -> Sampled:
             raise NotImplementedError
 
-    with pytest.raises(TypeError, match="Elsewhere is not a body of closed form"):
+    with pytest.raises(TypeError, match="Elsewhere is not a body of a simple shape"):
         tessellated(Elsewhere(), BESIDE, "bone")

@@ -148,9 +148,7 @@ def test_a_surface_through_itself_is_meshed_by_the_other_mesher(caplog: pytest.L
     assert len(self_intersections(dirty)) > 0
     with caplog.at_level(logging.WARNING):
         mesh = tetrahedralise(dirty, 16.0, {"all": np.ones(dirty.triangles.shape)})
-    assert (
-        "dirty.ply: meshed by fTetWild, differently each time, as gmsh cannot: 12 triangles pass through" in caplog.text
-    )
+    assert "dirty.ply: meshed by fTetWild, anew each time, as gmsh failed: 12 triangles pass through" in caplog.text
     assert "dirty.ply: 12 triangles of the given surface intersect others" in caplog.text
     assert mesh.maker == "fTetWild"
     assert mesh.facets == {}
@@ -223,7 +221,7 @@ SIXTH = Surface(CORNER[:4], boundary(np.array([[0, 1, 2, 3]]))[0], "corner.ply")
         (CORNER, np.zeros((0, 4), int), "no tetrahedra from the mesher"),
         (CORNER * (1, 1, 0), [[0, 1, 2, 3]], "a tetrahedron of zero volume"),
         (CORNER, [[0, 1, 2, 3], [0, 1, 2, 4], [0, 1, 2, 5]], "a triangle between 3 tetrahedra"),
-        (2 * CORNER, [[0, 1, 2, 3]], "tetrahedra of 1 mm3 in a surface of 0 mm3, want one clean body"),
+        (2 * CORNER, [[0, 1, 2, 3]], "tetrahedra of 1 mm3 in a surface that encloses 0 mm3, want one clean body"),
     ],
 )
 def test_what_a_mesher_must_not_give_is_named(points: np.ndarray, tets: list[list[int]], what: str) -> None:

@@ -211,7 +211,7 @@ BAD = {
         lambda case: edit(case, 'within = "1.5 mm"', 'within = "0.1 mm"'),
         "no vertex of the muscle",
     ),
-    "open surface": (None, lambda case: tamper(case, drop=1), "edges of one triangle only"),
+    "open surface": (None, lambda case: tamper(case, drop=1), "edges that belong to only one triangle"),
     "not a number": (None, lambda case: tamper(case, value=np.nan), "not finite"),
     "no such solver": (
         None,

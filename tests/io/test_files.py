@@ -84,12 +84,12 @@ def test_segments_become_lines(tmp_path: Path, cells: tuple[list[int], ...], wan
 @pytest.mark.parametrize(
     ("name", "text", "got"),
     [
-        ("ring.vtk", segments([0, 1], [1, 2], [2, 0]), "lines that close to a ring"),
+        ("ring.vtk", segments([0, 1], [1, 2], [2, 0]), "lines that form a closed ring"),
         ("none.vtk", segments(), "no lines"),
-        ("cut.vtk", segments([0, 1], [1, 2])[:-6], "3 numbers of 6"),
-        ("beyond.vtk", segments([0, 1], [1, 9]), "cell 1 with a point that does not exist, of 9"),
-        ("below.vtk", segments([0, 1], [-1, 2]), "cell 1 with a point that does not exist, of 9"),
-        ("point.vtk", segments([0, 1], [3]), "line 1 of 1 points"),
+        ("cut.vtk", segments([0, 1], [1, 2])[:-6], "3 numbers instead of 6"),
+        ("beyond.vtk", segments([0, 1], [1, 9]), "cell 1 with a point outside 0 to 8"),
+        ("below.vtk", segments([0, 1], [-1, 2]), "cell 1 with a point outside 0 to 8"),
+        ("point.vtk", segments([0, 1], [3]), "line 1 of fewer than two points"),
         ("nan.vtk", segments([0, 1]).replace("5 0 0", "5 nan 0"), r"a point that is not finite \(point 5\)"),
         ("inf.vtk", segments([0, 1]).replace("1 0 0", "1 0 inf"), r"a point that is not finite \(point 1\)"),
         ("flat.vtk", segments([0, 1], [3, 4]).replace("4 0 0", "3 0 0"), "line 1 of zero length"),
@@ -98,7 +98,7 @@ def test_segments_become_lines(tmp_path: Path, cells: tuple[list[int], ...], wan
 )
 def test_lines_that_are_none_are_refused(tmp_path: Path, name: str, text: str, got: str) -> None:
     (tmp_path / name).write_text(text)
-    with pytest.raises(InputError, match=f"{name}: got {got}.*want polylines, whole, as .vtk or .vtp"):
+    with pytest.raises(InputError, match=f"{name}: got {got}.*want complete polylines as .vtk or .vtp"):
         files.read_polylines(tmp_path / name, 1.0)
 
 
@@ -112,7 +112,7 @@ def test_what_a_solver_made_of_lines_is_read(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"moved\.vtp: got a point that is not finite \(point 0\)"):
         files.read_polylines(path, 1.0)
     (tmp_path / "cells.vtk").write_text(segments([0, 9]))
-    with pytest.raises(InputError, match=r"cells\.vtk: got cell 0 with a point that does not exist"):
+    with pytest.raises(InputError, match=r"cells\.vtk: got cell 0 with a point outside 0 to"):
         files.read_polylines(tmp_path / "cells.vtk", 1.0, moved=True)
 
 
@@ -139,7 +139,7 @@ def test_rows_of_a_table(tmp_path: Path) -> None:
 
 def test_a_table_that_is_no_text_is_refused(tmp_path: Path) -> None:
     (tmp_path / "table.csv").write_bytes(b"1,\xff\n")
-    with pytest.raises(InputError, match="want a comma separated table in UTF-8"):
+    with pytest.raises(InputError, match="want a comma-separated table in UTF-8"):
         files.read_rows(tmp_path / "table.csv")
 
 

@@ -33,7 +33,7 @@ def test_what_is_no_surface_is_refused(points: np.ndarray, corners: list, proble
 def test_lines_go_on_where_another_ends() -> None:
     assert soup.joined([[0, 1], [1, 2, 3], [5, 6]]) == [[0, 1, 2, 3], [5, 6]]
     assert soup.joined([[0, 1], [1, 2], [1, 3]]) == [[0, 1], [1, 2], [1, 3]]
-    with pytest.raises(ValueError, match="lines that close to a ring"):
+    with pytest.raises(ValueError, match="lines that form a closed ring"):
         soup.joined([[0, 1], [1, 0]])
 
 

@@ -112,7 +112,7 @@ def test_numbers_behind_links_of_hdf5_are_refused(link: str, tmp_path: Path, mon
     [
         ("run.h5:/", "../b/run.h5:/", 'a reference to "../b/run.h5", outside'),
         ('Format="HDF"', 'Format="Binary"', 'numbers in the format "Binary"'),
-        ("run.h5:/data0", "run.h5", "which is no FILE:/PLACE"),
+        ("run.h5:/data0", "run.h5", "which is not FILE:/PLACE"),
         ("<Xdmf", '<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/hostname">]><Xdmf', "a document type"),
     ],
 )

@@ -242,7 +242,7 @@ def test_a_bone_that_is_not_closed_has_no_inside(tmp_path, caplog) -> None:
     write_surface(tmp_path / "open.vtp", Surface(PLATE.points, PLATE.triangles[1:]), PLATE.points)
     bone = Bone("femur", read_surface(tmp_path / "open.vtp", 1.0), None)
     with pytest.raises(
-        InputError, match=r'bone "femur": .*open\.vtp: got 3 edges of one triangle only, .* closed surface'
+        InputError, match=r'bone "femur": .*open\.vtp: got 3 edges that belong to only one triangle, .* closed surface'
     ):
         _ = bone.shape
     for one in taken(run_of(BALL.points, BALL.points), floor(LOW), bone):

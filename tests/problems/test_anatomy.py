@@ -451,5 +451,5 @@ def test_a_patch_lies_on_the_bone_in_small_triangles() -> None:
 @pytest.mark.parametrize(("far", "apart"), [(1e6, r"1e\+06"), (1e200, "inf")])
 def test_landmarks_a_kilometre_apart_are_refused(far: float, apart: str) -> None:
     points = np.array([[0, 0, 0], [30, 0, 0], [0, 30, 0], [far, 0, 0.0]])
-    with pytest.raises(InputError, match=rf"got landmarks {apart} mm apart, want those around one attachment"):
+    with pytest.raises(InputError, match=rf"got landmarks {apart} mm apart, want landmarks around one attachment"):
         draped(fan(points), BALL)

@@ -50,9 +50,9 @@ def test_the_body_itself_is_one() -> None:
     ("frames", "message"),
     [
         ((), r"frames: got tuple \(\), want frame numbers, at least one"),
-        ((0, 2, 1), "frames: got tuple .*, want frame numbers that are each later than the one before"),
-        ((2, 1, 0), "each later than the one before"),
-        ((0, 1, 1), "each later than the one before"),
+        ((0, 2, 1), "frames: got tuple .*, want increasing frame numbers"),
+        ((2, 1, 0), "increasing frame numbers"),
+        ((0, 1, 1), "increasing frame numbers"),
         ((0, NAN, 1), "want frame numbers, at least one"),
         ((0, INF), "want frame numbers, at least one"),
         ((0, "1"), "want frame numbers, at least one"),
@@ -88,8 +88,8 @@ def test_components_are_axes(components) -> None:
         ({"path": lambda points, _: points * np.nan}, '"top": path at frame 0: got nan, want finite displacements'),
         ({"path": lambda points, frame: points * (np.inf if frame == 1 else 0)}, '"top": path at frame 1: got '),
         ({"path": lambda *_: "no"}, '"top": path at frame 0: got ValueError'),
-        ({"stiffness": -1.0}, r"prescribed\.top\.stiffness: got -1.0, want more than 0"),
-        ({"stiffness": "1 N"}, r"prescribed\.top\.stiffness: got 1 N, want more than 0"),
+        ({"stiffness": -1.0}, r"prescribed\.top\.stiffness: got -1.0, want a stiffness above 0"),
+        ({"stiffness": "1 N"}, r"prescribed\.top\.stiffness: got 1 N, want a stiffness above 0"),
         ({"anchor": (0.0, 0.0, 9.0)}, r"prescribed\.top\.anchor: got .*, want None, or springs at points of a skin"),
     ],
 )
@@ -102,7 +102,7 @@ def test_a_tendon_is_not_beside_tension_at_rest() -> None:
     tendon = fr.Prescribed("tendon", skin, ALL, Rest(), 1.0, (0.0, 0.0, 9.0))
     check_agreement(replace(BODY, prescribed=(FIXED, tendon)))
     tense = (*BODY.effects, effects.make("in_situ", stretch=1.1))
-    with pytest.raises(fr.InputError, match="effects: got a tendon beside in_situ, want one of them"):
+    with pytest.raises(fr.InputError, match="effects: got a tendon beside in_situ, want only one of these"):
         check_agreement(replace(BODY, effects=tense, prescribed=(FIXED, tendon)))
 
 
@@ -189,14 +189,14 @@ def test_regions_agree_at_what_they_share() -> None:
         (((0, 1, 1), (1.0, 1.0, 1.0), "tetrahedron"), "counts: got"),
         (((1, 1), (1.0, 1.0, 1.0), "tetrahedron"), "counts: got"),
         (((1.5, 1, 1), (1.0, 1.0, 1.0), "tetrahedron"), "counts: got"),
-        (((10**4, 10**4, 10**4), (1.0, 1.0, 1.0), "tetrahedron"), "counts: got .* cells at most"),
+        (((10**4, 10**4, 10**4), (1.0, 1.0, 1.0), "tetrahedron"), "counts: got .* at most .* cells"),
         ((3, (1.0, 1.0, 1.0), "tetrahedron"), "counts: got int 3"),
         (((1, 1, 1), (1.0, 0.0, 1.0), "tetrahedron"), "size: got"),
         (((1, 1, 1), (1.0, NAN, 1.0), "tetrahedron"), "size: got"),
         (((1, 1, 1), 10.0, "tetrahedron"), "size: got float 10"),
         (((1, 1, 1), ((), 1.0, 1.0), "tetrahedron"), r"size: got tuple \(\(\), 1.0, 1.0\)"),
         (((1, 1, 1), np.array(3.0), "tetrahedron"), r"size: got an array \(\)"),
-        (((1, 1, 1), (1e-5, 1.0, 1e4), "tetrahedron"), "size: got .* times as long as another"),
+        (((1, 1, 1), (1e-5, 1.0, 1e4), "tetrahedron"), "size: got .* times as long as each other"),
         (((1, 1, 1), (1.0, 1.0, 1.0), "P2"), "kind: got str 'P2'"),
         (((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron", 3), "degree: got int 3"),
     ],

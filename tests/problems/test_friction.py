@@ -41,6 +41,6 @@ def test_a_coefficient_that_is_none_is_refused() -> None:
         with pytest.raises(InputError, match=f"friction: got {wrong}, want a number above 0, or None"):
             check([0.3, wrong], begun=False)
     with pytest.raises(
-        InputError, match=r"friction: got 0\.3, want none in a body that does not start at rest, without tension"
+        InputError, match=r"friction: got 0\.3, want no friction in a body that starts deformed or under tension"
     ):
         check([0.3], begun=True)

@@ -119,7 +119,7 @@ def test_what_a_stored_run_shows_in_one_frame_in_the_middle_is_seen(
     with caplog.at_level("INFO", logger="fem_reference"):
         bench.obtain("reference", scene.reference, "reference")
     assert solved == [["NeoHooke", "Incompressible"], ["NeoHooke", "Incompressible", "Contact"]]
-    assert "Contact: needed as it turned out at frame 10" in caplog.text
+    assert "Contact: found to be needed at frame 10" in caplog.text
 
 
 def test_bones_that_turn_together_bend_nothing(tmp_path) -> None:

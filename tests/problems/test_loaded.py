@@ -29,7 +29,9 @@ def body(*prescribed: fr.Prescribed, on: str = "z0", name: str = "pressure") -> 
 
 @pytest.mark.parametrize("name", ["pressure", "traction"])
 def test_a_load_on_a_clamped_face_of_a_body_is_refused_by_every_solver(name) -> None:
-    message = rf'{name.title()} on "z0": got a part that is prescribed exactly .* want one that is free along an axis'
+    message = (
+        rf'{name.title()} on "z0": got a part that is prescribed exactly .* want a part that is free along an axis'
+    )
     with pytest.raises(fr.InputError, match=message):
         fr.solve_body(body(FIXED, name=name), element="P1")
     with pytest.raises(fr.InputError, match=message):

@@ -373,7 +373,7 @@ def test_a_block_is_meshed_as_one_and_its_fibres_stay_where_they_are(squeezed) -
 def test_what_is_no_block_is_refused_at_the_key_of_the_surface(bar) -> None:
     scene = casefile.read(bar)
     scene = scene.model_copy(update={"muscle": scene.muscle.model_copy(update={"mesher": "block"})})
-    with pytest.raises(InputError, match=r"case.toml: muscle.surface: .*bar.vtp: got \d+ triangles in no face"):
+    with pytest.raises(InputError, match=r"case.toml: muscle.surface: .*bar.vtp: got \d+ triangles outside the faces"):
         build_scene(scene)
 
 

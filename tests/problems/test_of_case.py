@@ -29,7 +29,7 @@ def test_a_scene_keeps_what_it_needs_and_has_the_key_of_that(tmp_path) -> None:
     assert origin.changes(kept[0]) == [], "what it chose is no change of its file"
     assert "Gravity: left out" in str(kept[0].decisions[2])
     assert "Gravity: needed" in str(kept[1].decisions[2])
-    assert "NeoHooke: kept, part of the material" in str(kept[0].decisions[0])
+    assert "NeoHooke: kept, as part of the material" in str(kept[0].decisions[0])
     itself = make_effect("touching", stiffness=0.1, smoothing=0.1)
     decided = estimates.Decision(itself, needed=True, indicator=None, bound=0.1, stress_bound=0.1)
     assert str(decided) == "MuscleContact: kept, as no estimate shows what touches"
@@ -82,11 +82,11 @@ def test_show_says_what_bones_are_and_how_they_move(squeezed, bar) -> None:
     assert facts["attachments"] == {}
     assert facts["bones"] == {
         "floor": "half space of point (0, 10, 0), normal (0, 1, 0), mm, rests",
-        "lid": "box of centre (0, 140, 0), size (400, 100, 400), rounding 0, mm, slides along (0, -1, 0), "
-        "mm at frame: 0 at 0, 40 at 100",
+        "lid": "box of centre (0, 140, 0), size (400, 100, 400), rounding 0, mm, slides along (0, -1, 0): "
+        "0 mm at frame 0, 40 mm at frame 100",
     }
     turning = casefile.read(bar)
-    assert "turns about (5, 5, 30) mm along" in case_facts(turning, muscle.setup(turning))["bones"]["lid"]
+    assert "through (5, 5, 30) mm: 0 rad at frame 0, " in case_facts(turning, muscle.setup(turning))["bones"]["lid"]
 
 
 def test_a_muscle_has_its_volume_the_areas_of_its_ends_and_its_effects(bar) -> None:

@@ -95,7 +95,7 @@ def test_the_shipped_plates_are_the_report_s() -> None:
         ({"boundary": [*ENDS[:1], {"on": "right", "where": "z", "slope": 0}]}, r'boundary\[1\]\.where: got "z"'),
         (
             {"boundary": [*ENDS[:1], *2 * [{"on": "right", "slope": 0}]]},
-            r"boundary\[2\]\.slope: got a facet that has a slope",
+            r"boundary\[2\]\.slope: got a facet that already has a slope",
         ),
     ],
 )
@@ -113,10 +113,10 @@ def test_scenes_that_are_not_usable(tmp_path, tables, match) -> None:
         ("points.csv", "0\n1\n2\n", "points.csv: got rows of 1 numbers"),
         ("triangles.csv", "1,2\n", "triangles.csv: got rows of 2 numbers"),
         ("triangles.csv", "1,2,2.5\n", "triangles.csv: got the vertex 2.5"),
-        ("triangles.csv", "1,2,4\n", "got a cell with a vertex outside of 1 to 3"),
+        ("triangles.csv", "1,2,4\n", "got a cell with a vertex outside 1 to 3"),
         ("bounds.csv", "1,2\n", "bounds.csv: got 1 rows"),
         ("bounds.csv", "1,4\n0,0\n", "bounds.csv: got vertices 1 to 4, want 1 to 3"),
-        ("more.csv", "1\n2\n", "more.csv: got values unlike those of another file of bounds"),
+        ("more.csv", "1\n2\n", "more.csv: got values that differ from another file of bounds"),
         ("bounds.csv", "1,1\n0,1\n", "bounds.csv: got a vertex named twice"),
     ],
 )

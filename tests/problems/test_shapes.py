@@ -301,7 +301,7 @@ def test_joined_pieces_do_not_share_the_name_of_a_region() -> None:
     """One called a with its b_x0, one called a_b with its x0."""
     one = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "hexahedron")
     other = replace(one, facets={f"b_{name}": facets for name, facets in one.facets.items()})
-    with pytest.raises(InputError, match="two regions of one name among a_b_x0"):
+    with pytest.raises(InputError, match="two regions with one name among a_b_x0"):
         shapes.joined({"a": other, "a_b": one})
 
 

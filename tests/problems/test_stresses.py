@@ -74,7 +74,7 @@ def test_fibres_that_were_stretched_after_all_are_added(tmp_path) -> None:
     watch = of_case.watch(scene, rest, lambda: None)
     assert watch.see(0, still, None) == ()
     (late,) = watch.see(10, longer, None)
-    assert "FibrePassive: needed as it turned out at frame 10" in str(late)
+    assert "FibrePassive: found to be needed at frame 10" in str(late)
 
 
 def test_an_effect_whose_stress_is_no_number_is_needed(tmp_path) -> None:

@@ -106,7 +106,7 @@ def test_energy_that_came_from_nowhere_is_judged_where_it_stands(
     else:
         (why,) = doubts
         assert why.startswith(
-            "-13.5 % of the energy without work at frame 10: the body jumped, or the load steps are too large"
+            "the energy changed by -13.5 % without work at frame 10: the body jumped, or the load steps are too large"
         )
         assert f"reference: doubtful, {why}" in printed
         assert '<span class="badge doubtful">doubtful pass</span>' in row(tmp_path, "reference")

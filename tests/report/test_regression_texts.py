@@ -101,7 +101,7 @@ def test_text_names_failures_and_why_nothing_can_be_said(mixed) -> None:
     assert any(
         "or further from it, run: ./fem compare ball --candidate ... --against BASELINE" in line for line in lines
     )
-    unknown = "inconclusive: the reference has an error bar of 0.5 mm, and 0 mm is within it of the 0.1 mm allowed"
+    unknown = "inconclusive: the reference has an error bar of 0.5 mm; 0 mm differs from the allowed 0.1 mm by less"
     assert f"{unknown} (fibre_length.rms within)" in lines
     assert lines[-1] == "verdict: fail"
     many = replace(mixed, judgements=mixed.judgements[:1] * 20)

@@ -39,8 +39,8 @@ def test_damage_is_named(tmp_path) -> None:
         ({"numbers": [0, 0]}, r"numbers: got \[0, 0\], want frame numbers that increase"),
         ({"numbers": [5, 0]}, r"numbers: got \[5, 0\], want frame numbers that increase"),
         ({"numbers": [-5, 0]}, r"numbers\[0\]: got -5, want greater than or equal to 0"),
-        ({"numbers": [0]}, r"want as many values of each of the scalars as there are numbers of frames"),
-        ({"scalars": {"energy": [1.0]}}, r"want as many values of each of the scalars as there are numbers of frames"),
+        ({"numbers": [0]}, r"want as many values of each of the scalars as there are frame numbers"),
+        ({"scalars": {"energy": [1.0]}}, r"want as many values of each of the scalars as there are frame numbers"),
         ({"status": "fine"}, r'status: got "fine", want'),
         ({"colour": "red"}, r"colour: got an unknown key, want one of"),
     ],
@@ -64,7 +64,7 @@ def test_what_is_amended_leaves_the_rest(tmp_path: Path) -> None:
 
 def test_frames_between_whole_numbers_share_no_file() -> None:
     assert frame_file(10.0, ".vtp") == frame_file(10, ".vtp") == "frame_0010.vtp"
-    with pytest.raises(ValueError, match=r"frame 0\.2 has no file, as its number is not whole"):
+    with pytest.raises(ValueError, match=r"frame 0\.2 has no file, as its number is not an integer"):
         frame_file(0.2, ".vtp")
 
 

@@ -303,7 +303,7 @@ def test_states_are_read_as_they_were_written(tmp_path) -> None:
 
 def test_a_run_without_states_another_scene_or_a_damaged_file_is_named(tmp_path) -> None:
     stored(tmp_path / "bare", None)
-    with pytest.raises(InputError, match="a run without states, want one of the reference, solved with store_state"):
+    with pytest.raises(InputError, match="a run without states, want a run of the reference, solved with store_state"):
         results.of_run(tmp_path / "bare", "hip_flexion")
     stored(tmp_path / "run", moved(affine(F)), None)
     assert states.read_rest(tmp_path / "run")[1] is None

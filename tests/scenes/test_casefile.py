@@ -107,12 +107,12 @@ WRONG = [
     (
         "effect[0]",
         PRESSURE | {"ramp": [{"frame": 0, "amount": 0.5}]},
-        "effect[0].ramp: got an amount of 0.5 at frame 0, the first, want 0 there, where the muscle rests",
+        "effect[0].ramp: got an amount of 0.5 at frame 0, the first, want 0 there, as the muscle is at rest",
     ),
     (
         "effect[0]",
         {"name": "contact", "stiffness": "1 kPa/mm", "support": "3 mm"},
-        'effect[0].support: got 3 mm, want it beside "in_situ" only',
+        'effect[0].support: got 3 mm, want no "support" without "in_situ"',
     ),
     ("effect", [PRESSURE, PRESSURE], 'effect[1].name: got "pressure" on "free" a second time, want every effect once'),
     ("attachment[0].name", "free", 'attachment: got the name "free" twice, want every name once'),
@@ -120,12 +120,12 @@ WRONG = [
     (
         "bone[1].motion.keyframes[0].angle",
         "1 deg",
-        "bone[1].motion: got a bone turned at the first frame, want angle 0 there",
+        "bone[1].motion: got a bone turned at the first frame, want an angle of 0",
     ),
     (
         "bone[1].motion",
         SLIDE | {"keyframes": [{"frame": 0, "distance": "2 mm"}, {"frame": 9, "distance": "1 mm"}]},
-        "bone[1].motion: got a bone moved at the first frame, want distance 0 there",
+        "bone[1].motion: got a bone moved at the first frame, want a distance of 0",
     ),
     ("bone[1].name", "wall", 'bone: got the name "wall" twice, want every name once'),
     ("attachment[1].name", "start", 'attachment: got the name "start" twice, want every name once'),
@@ -246,7 +246,7 @@ def test_a_muscle_in_situ_may_have_a_tone_and_supports_at_rest(bar: Path) -> Non
     scene = changed(bar, "effect", given)
     assert scene.effects[2].amount(0) == 0.02
     assert scene.effects[3].support == 3
-    with pytest.raises(InputError, match=r'effect\[3\].friction: got 0.3, want none beside "in_situ"'):
+    with pytest.raises(InputError, match=r'effect\[3\].friction: got 0.3, want no friction with "in_situ"'):
         changed(bar, "effect", [*given[:3], contact | {"friction": 0.3}])
 
 
@@ -260,7 +260,7 @@ def test_passive_fibres_are_slack_in_the_given_shape_but_in_situ(bar: Path) -> N
         )
     tense = [matrix, law | {"optimal_stretch": 0.9}]
     with pytest.raises(
-        InputError, match=r"effect\[1\]: got fibres under 18 kPa in the given shape, want slack ones, .*in_situ"
+        InputError, match=r"effect\[1\]: got fibres under 18 kPa in the given shape, want slack fibres .*in_situ"
     ):
         changed(bar, "effect", tense)  # 300 kPa 0.05 (exp(6.6 (1 / 0.9 - 1)) - 1) / 0.9
     changed(bar, "effect", [*tense, {"name": "in_situ", "stretch": 1.05}])

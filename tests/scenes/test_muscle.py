@@ -153,12 +153,12 @@ WRONG_BONES = [
     ),
     ("bone[0]", {"name": "wall"}, "bone[0]: got {'name': 'wall'}, want exactly one of \"surface\", \"half_space\""),
     ("bone[0]", {"name": "wall", "surface": "wall.ply"}, "bone[0]: got {"),
-    ("bone[0]", {"name": "wall", "surface": "wall.ply"}, 'want "unit" with "surface" and only with it'),
-    ("bone[0]", {"name": "wall", "capsule": ROD, "unit": "mm"}, 'want "unit" with "surface" and only with it'),
+    ("bone[0]", {"name": "wall", "surface": "wall.ply"}, 'want "unit" if and only if "surface" is given'),
+    ("bone[0]", {"name": "wall", "capsule": ROD, "unit": "mm"}, 'want "unit" if and only if "surface" is given'),
     (
         "bone[0]",
         {"name": "wall", "capsule": ROD, "distance_error": "0.05 mm"},
-        'want "distance_error" beside "surface" only: a closed form has none',
+        'want "distance_error" only with "surface", as a closed form has none',
     ),
     (
         "bone[0]",

@@ -98,7 +98,7 @@ def test_the_key_changes_with_each_muscle_and_not_with_what_is_expected(bar: Pat
             r"toml: muscle\[1\]\.effect\[0\]\.ramp: got an amount of 1",
         ),
         (several(nested("a"), nested("b")) + RAMPED, r"toml: effect\[2\]\.ramp: got an amount of 1"),
-        (several(nested("a")) + ATTACHED, r"attachment: got it, and muscle\[0\]\.attachment"),
+        (several(nested("a")) + ATTACHED, r"attachment: got this key and muscle\[0\]\.attachment"),
     ],
 )
 def test_mistakes_name_the_muscle(bar: Path, text: str, said: str) -> None:

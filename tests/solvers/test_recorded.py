@@ -203,7 +203,7 @@ def refuse(folder: Path, match: str, rest: Surface = REST) -> None:
 def test_a_cut_frame_is_refused(tmp_path: Path) -> None:
     path = sequence(tmp_path) / "run2_010.ply"
     path.write_bytes(path.read_bytes()[:-5])
-    refuse(tmp_path, r"run2_010\.ply: got .*, want a triangle surface, whole")
+    refuse(tmp_path, r"run2_010\.ply: got .*, want a complete triangle surface")
 
 
 def test_stl_triangles_in_another_order_do_not_fit(tmp_path: Path) -> None:

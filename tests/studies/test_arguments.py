@@ -61,7 +61,7 @@ def test_calls_with_what_they_do_not_want_are_refused(tmp_path) -> None:
         ),
         "solver: got int 3, want the name of a solver": lambda: fr.solve(case, 3),
         "case: got str 'bar', want a Case": lambda: fr.solve("bar"),
-        "progress: got int 3, want a function of a line": lambda: fr.solve(case, "pbd", progress=3),
+        "progress: got int 3, want a function that takes a line": lambda: fr.solve(case, "pbd", progress=3),
         "store: got int 3, want a path": lambda: fr.solve(case, "pbd", store=3),
         "store: got .*, while .*file is a file, want a folder": lambda: fr.solve(
             case, "pbd", store=tmp_path / "file" / "x"

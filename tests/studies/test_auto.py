@@ -134,9 +134,9 @@ def test_an_effect_that_turns_out_to_matter_is_added(tmp_path, monkeypatch, capl
         run = bench.obtain("reference", scene.reference, "reference")
     assert solved == [["NeoHooke", "Incompressible"], ["NeoHooke", "Incompressible", "Contact"]]
     assert reached == [0, 5, *run.numbers]  # it was stopped where it met the ball
-    assert "Contact: needed as it turned out at frame 5" in caplog.text
+    assert "Contact: found to be needed at frame 5" in caplog.text
     assert "Contact" in run.origin["effects"]
-    assert any(text.startswith("Contact: needed as it turned out") for text in run.origin["effects_chosen"])
+    assert any(text.startswith("Contact: found to be needed") for text in run.origin["effects_chosen"])
     with monkeypatch.context() as patch:
         patch.setattr(estimates, "_near", blind)
         again = Bench(scene, tmp_path / "runs")

@@ -93,7 +93,7 @@ def test_a_file_of_no_study_is_named_and_a_folder_of_none_is(tmp_path: Path) -> 
     (tmp_path / "study").mkdir()
     path = tmp_path / "study" / "study.json"
     path.write_text("[]")
-    with pytest.raises(InputError, match=rf"{path}: got \[\], want a study as the verb study writes it"):
+    with pytest.raises(InputError, match=rf"{path}: got \[\], want a study written by the verb study"):
         cost.stored(tmp_path)
 
 

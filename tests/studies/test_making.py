@@ -201,7 +201,7 @@ def test_fibres_that_are_stretched_inside_only_are_added(stored, tmp_path, monke
     with caplog.at_level("INFO", logger="fem_reference"):
         run = asked(bench)
     assert [len(titles) for titles in made] == [2, 3]
-    assert "FibrePassive: needed as it turned out at frame" in caplog.text
+    assert "FibrePassive: found to be needed at frame" in caplog.text
     assert "FibrePassive" in run.origin["effects"]
 
 
@@ -235,7 +235,7 @@ def test_a_run_that_is_stopped_at_its_end_goes_on_with_what_matters(tmp_path) ->
         bench = Bench(scene, tmp_path / f"runs of {choice}")
         found.append(bench.obtain("reference", scene.reference, "reference"))
     chosen, listed = found
-    assert any("Gravity: needed as it turned out at frame 0" in text for text in chosen.origin["effects_chosen"])
+    assert any("Gravity: found to be needed at frame 0" in text for text in chosen.origin["effects_chosen"])
     assert "effects were added, from frame 0 on" in chosen.outcome.message
     assert chosen.positions == pytest.approx(listed.positions, abs=1e-6)
     # 4 cm3 of 20 kg/m3 weigh 0.78 mN, which one bone carries more than the other does; springs of 1e-5 MPa/mm over 100 mm2.

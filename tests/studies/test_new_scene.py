@@ -71,7 +71,7 @@ def test_what_cannot_be_is_refused_and_nothing_is_written(stl: Path, capsys) -> 
     for given, want in (
         (["new", str(taken)], "which exists already"),
         (words(stl)[:6], "--bone: got 1 files, want two or more"),
-        (words(stl, "--from", "rod"), '--from: got "rod" beside --muscle'),
+        (words(stl, "--from", "rod"), '--from: got "rod" with --muscle'),
         (["new", str(stl / "mine"), "--bone", "x.stl"], "--bone: got a bone without --muscle"),
         ([*words(stl)[:4], "--bone", str(stl / "my_femur.stl"), "--bone", str(stl / "no.stl")], "no.stl"),
     ):

@@ -93,7 +93,7 @@ def test_a_guess_is_printed_with_what_it_follows_from(tmp_path: Path, capsys) ->
     assert made(tmp_path, bodies(tmp_path, dict.fromkeys(SIZES, 1000.0)), *options) == cli.DONE
     said = capsys.readouterr().out
     # sqrt(207^2 + 2 * 30^2) and sqrt(300^2 + 2 * 30^2) mm, in m
-    assert 'lengths are in m, guessed: "muscle.stl" is 0.211 long, a muscle in m; "low.stl" is 0.303 long' in said
+    assert 'lengths are in m (guessed: "muscle.stl" is 0.211 long, a muscle in m; "low.stl" is 0.303 long' in said
     assert json.loads((tmp_path / "new.json").read_text())["unit"] == "m"
     assert length(tmp_path) == pytest.approx(207, rel=1e-5)
 

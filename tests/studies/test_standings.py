@@ -147,7 +147,7 @@ def test_a_submission_that_is_not_as_it_was_submitted_is_refused(place, capsys) 
 def test_a_submission_is_of_one_case_as_it_was_published(place, capsys) -> None:
     for words in (("--quick",), ("--set", "reference.newton_iterations=7")):
         assert cli.main(["standings", "./bar", "--submission", "mine", *words]) == cli.BAD_INPUT
-        assert "--submission: got --quick or --set" in capsys.readouterr().err
+        assert "--submission: got this option with --quick or --set" in capsys.readouterr().err
     key = casefile.read_muscle("./bar", {"reference.newton_iterations": 7}).key
     submit(place / "mine", scene=key)
     assert ERROR in stand("--submission", "mine", "--set", "reference.newton_iterations=7")["rows"][1]["worst"]

@@ -186,7 +186,9 @@ def test_a_foreign_solver_that_cannot_stand_is_bad_input(case, words, place, cap
 def test_other_pages_have_no_candidates(capsys) -> None:
     assert cli.main(["page", "octave-examples", "--case", "rod", "--quiet"]) == cli.BAD_INPUT
     said = capsys.readouterr().err
-    assert "page: got --case for octave-examples, want it for table-5-1, error-bars and estimation only" in said
+    assert (
+        "page: got --case for octave-examples, want this option for table-5-1, error-bars and estimation only" in said
+    )
 
 
 def table(*found: SolverResult) -> Table:

@@ -16,7 +16,7 @@ _TYPES = {
     "unsigned_char": "u1", "unsigned_short": "u2", "unsigned_int": "u4", "unsigned_long": "u8", "vtktypeuint32": "u4",
     "vtktypeuint64": "u8", "vtkidtype": "i4", "float": "f4", "double": "f8",
 }  # fmt: skip
-# The number of components of attributes for which it is fixed; the third word of their line is the type.
+# Attributes with a fixed number of components, and this number; the third word of their line is the type.
 _COMPONENTS = {"VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6}
 _COMPONENTS |= dict.fromkeys(("GLOBAL_IDS", "PEDIGREE_IDS", "EDGE_FLAGS"), 1)
 
@@ -25,7 +25,7 @@ def read(data: bytes) -> DataSet:
     """The data set of a file; other sections are skipped. ValueError or another exception if it is incomplete."""
     head = _HEAD.match(data)
     if head is None:
-        raise ValueError("no head of a VTK file")
+        raise ValueError("no header of a VTK file")
     if head[4] not in _KINDS:
         raise ValueError(f"a VTK file of {head[4].decode()}, neither {' nor '.join(_KINDS.values())}")
     file = _File(data, head.end(), text=head[3] == b"ASCII")
@@ -70,7 +70,7 @@ class _File:
             raise ValueError(f'numbers of type "{kind}"')
         dtype, count = np.dtype(">" + _TYPES[kind.lower()]), whole_number(number, "a count") * components
         if count > len(self.data) - self.at + 1:
-            raise ValueError(f"{count} numbers said to be in {len(self.data) - self.at} bytes")
+            raise ValueError(f"{count} numbers declared in {len(self.data) - self.at} bytes")
         if not self.text:
             found = np.frombuffer(self.data, dtype, count, self.at)
             self.at += found.nbytes
@@ -83,7 +83,7 @@ class _File:
             return values.astype(np.float64 if dtype.kind == "f" else np.int64).astype(dtype.newbyteorder("="))
 
     def cells(self, count: str, size: str) -> tuple[Any, Any]:
-        """Sizes of cells and their corners, in files before version 5: each cell is preceded by its size."""
+        """Sizes of cells and their corners, before version 5 of the format: each cell is preceded by its size."""
         values = self.array(size, "int").tolist()
         sizes, corners, at = list[int](), list[int](), 0
         while at < len(values):
@@ -94,7 +94,7 @@ class _File:
         return sizes, corners
 
     def cells_by_offsets(self, count: str, size: str) -> tuple[Any, Any]:
-        """Sizes of cells and their corners, from version 5 on."""
+        """Sizes of cells and their corners, from version 5 of the format on."""
         offsets, corners = self._named("OFFSETS", count), self._named("CONNECTIVITY", size)
         if len(offsets) and offsets[0] != 0:
             raise ValueError("offsets that do not begin with 0")

@@ -22,7 +22,7 @@ _KINDS = {"PolyData": ("Lines", "Strips", "Polys"), "UnstructuredGrid": ("Cells"
 _TYPES = {"Float32": "f4", "Float64": "f8"}
 _TYPES |= {f"{sign}Int{8 * size}": f"{sign or 'i'}{size}".lower() for sign in ("", "U") for size in (1, 2, 4, 8)}
 _END = re.compile(rb"</AppendedData>\s*</VTKFile>\s*\Z")
-# The most bytes of a compressed array once it is expanded.
+# The largest size in bytes of a compressed array after it is expanded.
 _MOST = 2**28
 
 
@@ -62,7 +62,7 @@ def _points(piece: Element, arrays: "_Arrays") -> Any:
 
 
 def _cells(piece: Element, name: str, arrays: "_Arrays", points: int) -> tuple[Ints, Ints, Ints]:
-    """Sizes, corners and types of the cells of a piece with this ``name``; ``points``: their number; polygons have no types."""
+    """Sizes, corners and types of the cells of a piece by ``name``, for a number of ``points``; polygons have no types."""
     count, found = _number_of(piece, name), {one.get("Name"): one for one in piece.findall(f"{name}/DataArray")}
     wanted = ("offsets", "connectivity", *(["types"] if name == "Cells" else []))
     ends, corners, *types = (np.asarray(arrays.read(found[key]) if count else [], np.int64) for key in wanted)
@@ -80,7 +80,7 @@ class _Arrays:
         self.header = np.dtype(f"{self.order}u{8 if root.get('header_type') == 'UInt64' else 4}")
         self.compressor = root.get("compressor")
         if self.compressor and self.compressor not in _UNPACKING:
-            raise ValueError(f"arrays compressed by {self.compressor[:40]}, none of {', '.join(_UNPACKING)}")
+            raise ValueError(f"arrays compressed by {self.compressor[:40]}, which is none of {', '.join(_UNPACKING)}")
         attributes, _, self.appended = appended.partition(b"_")
         self.encoded = b"base64" in attributes
 
@@ -94,7 +94,7 @@ class _Arrays:
         if form == "appended":
             offset = int(array.attrib["offset"])
             if not 0 <= offset <= len(self.appended):
-                raise ValueError(f"an array at {offset} of {len(self.appended)} bytes")
+                raise ValueError(f"an array at byte {offset} of {len(self.appended)}")
             data, encoded = memoryview(self.appended)[offset:], self.encoded
         else:
             data, encoded = memoryview("".join(text.split()).encode("ascii")), True
@@ -126,7 +126,7 @@ class _Arrays:
 
 def _taken(data: memoryview, count: int) -> bytes:
     if count > len(data):
-        raise ValueError(f"{len(data)} bytes of {count}")
+        raise ValueError(f"{len(data)} bytes instead of {count}")
     return bytes(data[:count])
 
 
@@ -152,10 +152,10 @@ _UNPACKING: dict[str, Callable[[bytes, int], bytes]] = {
 
 
 def _numbers(text: str, dtype: np.dtype[Any]) -> Any:
-    """The numbers of a text; ValueError if a word is not a number."""
+    """The numbers in a text; ValueError if a word is not a number."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
         try:
             return np.fromstring(text, dtype, sep=" ")
         except DeprecationWarning as error:
-            raise ValueError("a word that is no number") from error
+            raise ValueError("a word that is not a number") from error

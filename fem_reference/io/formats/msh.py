@@ -1,4 +1,4 @@
-"""MSH of gmsh, by meshio."""
+"""The MSH format of gmsh, read with meshio."""
 
 import io
 import re
@@ -25,7 +25,7 @@ class _Ending(io.BufferedReader):
         line = super().readline(size)
         self.past += not line
         if self.past > _PAST_END:
-            raise ValueError("a section that goes on beyond the end of the file")
+            raise ValueError("a section that extends beyond the end of the file")
         return line
 
 
@@ -45,7 +45,7 @@ def read_mesh(path: Path) -> Any:
 
 
 def _check_declared(data: bytes) -> None:
-    """ValueError if a section declares more nodes or elements, or blocks of them, than a file has bytes."""
+    """Raise ValueError if a section declares more nodes or elements, or blocks of these, than a file has bytes."""
     header = data[:60].split()
     binary, old = header[2:3] == [b"1"], header[1:2] == [b"2.2"]
     for name, first in _DECLARED.findall(data):
@@ -54,7 +54,7 @@ def _check_declared(data: bytes) -> None:
         else:  # in old files this number is text, even if the rest is binary
             numbers = [int(word[:20]) for word in first.split()[: 1 if old else 2] if word.isdigit()]
         if max(numbers, default=0) > len(data):
-            raise ValueError(f"{name.decode()} that are more than the file has bytes")
+            raise ValueError(f"more {name.decode()} than the file has bytes")
 
 
 FORMAT = Format((".msh",), _read)

@@ -1,4 +1,4 @@
-"""Wavefront OBJ with numpy alone."""
+"""The Wavefront OBJ format, with numpy alone."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ from fem_reference.io.soup import Soup, only_triangles, positions
 
 
 def _read(path: Path) -> Soup:
-    """Wavefront OBJ: the positions and faces, corners counted from 1, or back from the last."""
+    """The positions and faces of an OBJ file; corners are counted from 1, or backwards from the last position."""
     points: list[list[float]] = []
     triangles = []
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():

@@ -1,4 +1,4 @@
-"""PLY with numpy alone."""
+"""The PLY format, with numpy alone."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ _CORNERS = ("vertex_indices", "vertex_index")
 
 
 def _read(path: Path) -> Soup:
-    """PLY, text or binary of either byte order; a list must have the same length in all rows of an element."""
+    """The positions and faces of a PLY file, text or binary; a list must have the same length in all rows of an element."""
     parts = re.match(rb"ply\s(.*?)end_header\r?\n(.*)", path.read_bytes(), re.DOTALL)
     if parts is None:
         raise ValueError("no PLY header")
@@ -34,7 +34,7 @@ def _read(path: Path) -> Soup:
         properties = [line[1:] for line in words[start:stop] if line[:1] == ["property"]]
         tables[name], body = _element(body, int(count), properties, types)
     if not {"vertex", "face"} <= tables.keys():
-        raise ValueError("no vertices with faces")
+        raise ValueError("no vertices or no faces")
     vertex, face = tables["vertex"], tables["face"]
     corners = next(name for name in _CORNERS if name in face.dtype.names)
     return np.column_stack([vertex[axis] for axis in "xyz"]), face[corners]

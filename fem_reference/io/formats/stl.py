@@ -1,4 +1,4 @@
-"""STL with numpy alone."""
+"""The STL format, with numpy alone."""
 
 import re
 from pathlib import Path
@@ -12,7 +12,7 @@ _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute
 
 
 def _read(path: Path) -> Soup:
-    """STL, text or binary: three points a triangle, in the order of the file."""
+    """The triangles of an STL file, text or binary: three points for each, in the order of the file."""
     data = path.read_bytes()
     count = int.from_bytes(data[80:84], "little")
     if len(data) >= 84 and len(data) == 84 + 50 * count:
@@ -21,7 +21,7 @@ def _read(path: Path) -> Soup:
         lines = [line.split()[1:] for line in data.splitlines() if line.lstrip().startswith(b"vertex")]
         points = np.array(lines).astype(np.float64)
     else:
-        raise ValueError(f"{len(data)} bytes that are no complete STL file")
+        raise ValueError(f"{len(data)} bytes that are not a complete STL file")
     return points, np.arange(len(points)).reshape(-1, 3)
 
 

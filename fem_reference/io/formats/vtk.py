@@ -41,7 +41,7 @@ def _read(path: Path) -> Soup:
     if data.kind == "UnstructuredGrid" and (other := set(data.types.tolist()) - {_TRIANGLE}):
         raise ValueError(f"cells of VTK type {', '.join(map(str, sorted(other)))}")
     if "Strips" in data.cells and len(data.cells["Strips"].corners):
-        raise ValueError(f"{data.kind} that is not made of triangles")
+        raise ValueError(f"{data.kind} with cells other than triangles")
     cells = data.cells.get("Cells" if data.kind == "UnstructuredGrid" else "Polys")
     if cells is None or len(cells.corners) == 0:
         return np.empty((0, 3)), np.empty((0, 3))
@@ -60,7 +60,7 @@ def read_lines(path: Path, *, moved: bool) -> tuple[Floats, list[list[int]]]:
     cells = [cell.tolist() for cell in np.split(found.corners, np.cumsum(found.sizes)[:-1])]
     for number, cell in enumerate(cells):
         if len(cell) < 2:
-            raise ValueError(f"line {number} of {len(cell)} points")
+            raise ValueError(f"line {number} of fewer than two points")
     points, lines = np.asarray(data.points, np.float64), joined(cells)
     if not moved:
         check_lengths(points, lines)
@@ -74,7 +74,7 @@ def data_set(path: Path) -> DataSet:
 
 
 def save(path: Path, points: Floats, cells: Ints | Polylines, displacement: Floats) -> None:
-    """Write ``cells``, in VTU as an unstructured grid, with point data ``displacement`` (n, 3) [mm]; OSError if that fails."""
+    """Write ``cells`` (in VTU as an unstructured grid) with point data ``displacement`` (n, 3) [mm]; OSError if that fails."""
     data, suffix = _data_set(DataBlock(points, cells)), path.suffix.lower()
     data.point_data.set_vectors(displacement, "displacement")
     _finish(_WRITERS[suffix], path, data.cast_to_unstructured_grid() if suffix == ".vtu" else data)
@@ -93,11 +93,11 @@ def _finish(kind: str, path: Path, data: Any) -> None:
         writer.write()
     if code := writer.writer.GetErrorCode():
         number = errno.ENOSPC if code == _NO_ROOM else int(code)
-        raise OSError(number, os.strerror(number) if number in errno.errorcode else f"error {code} of VTK")
+        raise OSError(number, os.strerror(number) if number in errno.errorcode else f"VTK error {code}")
 
 
 def write_blocks(path: Path, blocks: Tree) -> None:
-    """VTM of ``blocks`` by name, with their files in a folder beside it, not atomically; OSError if that fails."""
+    """Write a VTM file of ``blocks`` by name, with their files in a folder beside it, not atomically; OSError if that fails."""
     _finish("XMLMultiBlockDataWriter", path, _collection(blocks))
 
 

@@ -158,14 +158,16 @@ def test_regions_and_fibres_that_a_body_lacks_are_named() -> None:
 
 def test_forces_have_names_of_their_own() -> None:
     fixed = (Prescribed("end", "z0", (2,), Rest()), Prescribed("end", "z1", (2,), Rest()))
-    with pytest.raises(InputError, match='prescribed: got "end" twice, want a name for each'):
+    with pytest.raises(InputError, match='prescribed: got "end" twice, want a different name for each'):
         check(Body(box("Q1/P0"), FLESH, fixed, (0.0, 1.0)), "Q1/P0")
 
 
 @pytest.mark.parametrize("stiffness", [0.0, -1.0, float("nan")])
 def test_springs_pull(stiffness) -> None:
     fixed = (Prescribed("end", "z0", (2,), Rest(), stiffness),)
-    with pytest.raises(InputError, match=r"prescribed\.end\.stiffness: got .*, want more than 0, or None: exact"):
+    with pytest.raises(
+        InputError, match=r"prescribed\.end\.stiffness: got .*, want a stiffness above 0, or None if exact"
+    ):
         check(Body(box("Q1/P0"), FLESH, fixed, (0.0, 1.0)), "Q1/P0")
 
 
@@ -194,10 +196,10 @@ def test_regions_are_on_the_boundary_of_the_cells(element) -> None:
 
     checked(np.flip(every, axis=1))  # in whatever order
     lost = shared_facet(mesh)
-    with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each \(1 of 3"):
+    with pytest.raises(InputError, match=r"facets\.lid: got facets that do not belong to one cell each \(1 of 3"):
         checked([every[0], every[1], lost])
     pressed = effect("pressure", on="lid", pressure="1 kPa", ramp=ONCE)
-    with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each \(1 of 1"):
+    with pytest.raises(InputError, match=r"facets\.lid: got facets that do not belong to one cell each \(1 of 1"):
         checked([lost], (*acting, pressed), ())
     with pytest.raises(InputError, match=r"facets\.lid: got none, want facets of one cell each"):
         checked(every[:0])

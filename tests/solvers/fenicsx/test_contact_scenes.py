@@ -194,5 +194,5 @@ def test_an_obstacle_and_an_attachment_have_names_of_their_own(tmp_path) -> None
 
 def test_a_bone_that_the_muscle_swallows_is_refused(tmp_path) -> None:
     case = scene(tmp_path / "bar", 5.0)
-    with pytest.raises(InputError, match=r"case.toml: bone\[2\]: got a bone wholly inside the muscle"):
+    with pytest.raises(InputError, match=r"case.toml: bone\[2\]: got a bone entirely inside the muscle"):
         muscle.build(case, muscle.setup(case))

@@ -145,5 +145,5 @@ def test_a_body_that_begins_under_tension_has_no_friction() -> None:
     wrong = [replace(body, start=np.array), replace(body, contact=replace(LAW, in_situ=0.0))]
     wrong += [replace(body, effects=(*body.effects, make_effect("in_situ", stretch=1.05)))]
     for one in wrong:
-        with pytest.raises(InputError, match=r"friction: got 0\.3, want none in a body that does not start at rest"):
+        with pytest.raises(InputError, match=r"friction: got 0\.3, want no friction in a body that starts deformed"):
             check_agreement(one)

@@ -42,7 +42,7 @@ def test_holds_that_would_tear_an_edge_are_refused() -> None:
 @pytest.mark.parametrize(
     ("name", "got", "want"),
     [
-        ("bones.deep_overlap", "5.9 mm of overlap with the muscle at rest", "its middle is 6 mm deep"),
+        ("bones.deep_overlap", "5.9 mm of overlap with the muscle at rest", "in the middle of the bone, 6 mm deep"),
         ("degenerate.coincident", r"2.8e\+07 times as long as thick", "double precision"),
     ],
 )
