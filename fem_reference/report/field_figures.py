@@ -44,7 +44,7 @@ def drawings(example: Comparison) -> list[Drawing]:
 
 
 def convergence(example: Comparison) -> Drawing:
-    """Error over number of cells, a line for each element."""
+    """Error against the number of cells, with a line for each element."""
     title = "Error as the mesh is refined"
     lines = [(one.element, *positive(np.array(one.cells, float), np.array(one.errors))) for one in example.ladders]
     if not any(len(cells) for _, cells, _ in lines):
@@ -107,7 +107,7 @@ def _sorted(run: Run, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _look(i: int, run: Run) -> dict[str, Any]:
-    """The style of a line: for the listing the style of its ``plot`` command, otherwise by the index of the run."""
+    """The style of a line: for the listing the style of its ``plot`` command, otherwise a style by the index of the run."""
     if run.solver == "listing":
         return dict(_LISTING)
     marker = _MARKERS[i % len(_MARKERS)]
@@ -139,7 +139,7 @@ def _panels(example: Comparison, draw: Callable[..., None]) -> Iterator[Drawing]
         if np.isfinite(values).all():
             yield _webp(title, partial(draw, example=example, values=values, scale_of=scale_of, colours=colours))
         else:
-            yield Drawing(title, missing="its values are not a number")
+            yield Drawing(title, missing="its values are not numbers")
 
 
 def _called(run: Run) -> str:

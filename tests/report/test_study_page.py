@@ -94,7 +94,7 @@ def test_what_is_within_the_bar_from_the_fastest_setting_on_is_said_to_be_so() -
     said = study_page.sentences(replace(study(), bars={"surface_deviation.rms": 1.0}))
     assert (
         said[0]
-        == "The error of fenicsx is within the bar of the truth, 1 mm, from 10 ms a frame on (fenicsx, as it is)."
+        == "The error of fenicsx is within the bar of the truth, 1 mm, at 10 ms a frame or more (fenicsx, as it is)."
     )
 
 
