@@ -12,11 +12,11 @@ from fem_reference.foundations.records import Record, parse
 from fem_reference.io import texts
 from fem_reference.scenes import casefile
 
-_WANT = "a folder or an archive (zip, tar) with published data, whole"
+_WANT = "an undamaged folder or archive (zip, tar) with published data"
 
 
 class Listed(Record):
-    """Size [bytes] and SHA-256 of files by their path below the data folder: as ``published``, or ``made`` from such files."""
+    """Size [bytes] and SHA-256 of files by their path below the data folder: as ``published``, or ``made`` from published files."""
 
     licence: str
     published: dict[str, tuple[int, str]]

@@ -1,4 +1,4 @@
-"""Muscles drawn at random by a seed, as cases: a spindle or strap between two bones, with motion and activation."""
+"""Random muscles as cases, determined by a seed: a spindle or strap between two bones, with motion and activation."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -45,7 +45,7 @@ pennation = "{:.4g} deg\""""
 
 
 def shape(rng: np.random.Generator) -> tuple[Surface, float]:
-    """A closed surface along z, with elliptic sections and flat ends at 0 and at its length [mm]; surface and length."""
+    """A closed surface along z, with elliptical sections and flat ends at 0 and at its length [mm]; surface and length."""
     length, wide = rng.uniform(50, 110), rng.uniform(9, 16)
     flat, first, last = rng.uniform(0.55, 1), rng.uniform(0.5, 0.95), rng.uniform(0.5, 0.95)
     belly, bow = rng.uniform(0.35, 0.65), rng.uniform(0, 0.1) * length
@@ -85,7 +85,7 @@ def _turn(axis: Sequence[float], centre: Sequence[float], amounts: Floats) -> st
 
 
 def write(folder: Path, seed: int, number: int, poses: int) -> MuscleCase:
-    """Write muscle ``number`` of a ``seed`` into a ``folder``, with this number of random ``poses`` beside rest. The lower bone
+    """Write muscle ``number`` of a ``seed`` into a ``folder``, with this number of random ``poses`` besides rest. The lower bone
     turns about an axis beside the muscle. Of every three muscles, two have an upper bone that turns about another axis, one has an
     obstacle that slides into its side, and two are activated. The seed and the number determine all random values.
     """

@@ -101,8 +101,8 @@ def test_the_worst_example_gives_the_word(tmp_path):
 @pytest.mark.parametrize(
     ("form", "speed", "printed"),
     [
-        ("auto", 100.0, "It is above 1, so that the form is SUPG"),
-        ("auto", 1.0, "It is not above 1, so that the form is plain Galerkin"),
+        ("auto", 100.0, "It is above 1, so the form is SUPG"),
+        ("auto", 1.0, "It is not above 1, so the form is plain Galerkin"),
         ("supg", 1.0, "The scene asks for SUPG"),
         ("galerkin", 100.0, "The scene asks for plain Galerkin"),
     ],
