@@ -197,7 +197,7 @@ class _Window:
 
     @property
     def half(self) -> tuple[float, float]:
-        """Half its width and height: a square, narrower if it is higher than wide."""
+        """Half the window's width and height: a square, narrower if the part is higher than wide."""
         width, height = (float(length) for length in 0.53 * (self.high - self.low)[:2])
         height = max(width, height)
         return max(width, height / 2), height
@@ -247,7 +247,7 @@ def _front(mesh: FieldMesh, values: Floats, scale: ScalarMappable, line: float) 
     faces = np.asarray(scale.to_rgba(values[mesh.cells].mean(axis=1)))
     faces[:, :3] *= (0.55 + 0.45 * light)[:, None]
     order = np.argsort(corners[:, :, 2].mean(axis=1))
-    # Triangles get an edge of their own colour; without it the white background shows between them.
+    # Triangles get edges in their own colour; without them the white background shows between triangles.
     edges: Any = (0, 0, 0, 0.5) if line else faces[order]
     shown = list(corners[order, :, :2])
     return PolyCollection(shown, facecolors=faces[order], edgecolors=edges, linewidths=line or 0.2)

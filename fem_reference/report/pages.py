@@ -98,7 +98,7 @@ def stamped(page: Page, asked: str = "") -> str:
 
 
 def read(path: Path) -> PageHead | None:
-    """The head of the page at ``path``; None if there is no page by this package, or if it is damaged."""
+    """The head of the page at ``path``; None if the file is not a page of this package or is damaged."""
     if not path.is_file():  # reading a pipe would block
         return None
     try:

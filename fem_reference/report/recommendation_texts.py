@@ -118,9 +118,7 @@ def _reason(one: Expected, unit: str, limit: float) -> list[str]:
         return [f"the truth itself is known only to {known}: no smaller error can be proven"]
     if one.error > limit >= one.error - one.bar:
         within = f"{number(limit)} {unit}"
-        return [
-            f"without the error bar of the truth, the error would be within {within}: the bar is too large to decide"
-        ]
+        return [f"without the bar, the error would be within {within}: the bar of the truth is too large to decide"]
     return []
 
 

@@ -25,7 +25,7 @@ from fem_reference.report.words import title_of as in_words
 
 REFERENCE = "fenicsx"
 TIME = "seconds_per_frame"
-# The statistic in the tables, and the quantities of which the tables compare equal values.
+# The statistic in the tables, and the quantities at equal values of which solvers are compared.
 MAIN = next(map(".".join, described("rank")))
 MATCHED = (TIME, "peak_memory_mb", "unknowns")
 
@@ -141,7 +141,7 @@ def as_measured(case: CaseStudy, point: Point, error: str) -> float | None:
 
 
 def left_out(case: CaseStudy) -> list[Point]:
-    """The points that did not reach all frames or were refused, and so are on no front."""
+    """The points that did not reach all frames or were refused, and are therefore on no front."""
     return [point for point in case.points if point.status != "converged"]
 
 

@@ -71,7 +71,7 @@ def _head(case: Case, run: Run, word: Word) -> dict[str, Any]:
 
 
 def as_csv(rows: Iterable[dict[str, Any]]) -> str:
-    """Rows of ``COLUMNS`` as CSV text, numbers in full; a number that is not finite is left empty."""
+    """Rows of ``COLUMNS`` as CSV text, with all digits; a number that is not finite is left empty."""
     text = io.StringIO()
     writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
     writer.writeheader()

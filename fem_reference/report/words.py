@@ -79,7 +79,7 @@ def words(name: str) -> str:
 
 
 def listed(names: list[str]) -> str:
-    """Names in a sentence.
+    """Names joined for a sentence.
 
     >>> listed(["pbd"]), listed(["pbd", "arap", "ours"])
     ('pbd', 'pbd, arap and ours')

@@ -40,9 +40,7 @@ def check_muscle(name: object, case: object) -> None:
     names = [one.name for one in case.muscle] if isinstance(case, MusclesCase) else []
     if name not in (names or [""]):
         raise InputError(
-            "muscle",
-            said(name),
-            f"one of {', '.join(names)}" if names else "none, as this case does not have several muscles",
+            "muscle", said(name), f"one of {', '.join(names)}" if names else "none, without several muscles"
         )
 
 

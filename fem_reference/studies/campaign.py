@@ -164,7 +164,7 @@ def _loaded(folder: Path, trial: Trial) -> Run:
 
 @contextmanager
 def _executor(workers: Workers) -> Iterator[Executor]:
-    """Processes of this machine, or the workers of a Dask scheduler, which hands the run of a worker that died to another one."""
+    """Processes of this machine, or the workers of a Dask scheduler, which gives the run of a dead worker to another worker."""
     if workers.address is None:
         # Spawned processes, as numba, PETSc and locks do not survive a fork.
         before = set(multiprocessing.active_children())

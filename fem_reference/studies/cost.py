@@ -73,9 +73,7 @@ def _of(case: MuscleCase, store: Path, workers: Workers, only: Collection[str]) 
     log.info("%s: the truth", case.name)
     truth = bench.reference()
     if truth.outcome.status != "converged" or truth.fibres is None:
-        raise InputError(
-            case.place, f"a reference with the status {truth.outcome.status}", "one that reaches all frames"
-        )
+        raise InputError(case.place, f"a reference with status {truth.outcome.status}", "one that reaches all frames")
     bars = refinement.bars(bench, truth, model=False)
     context, own = context_of(bench.setup(), truth), case.reference.solver
     triangles = len(truth.surface.triangles)
@@ -109,7 +107,7 @@ def _of(case: MuscleCase, store: Path, workers: Workers, only: Collection[str]) 
 
 
 def known(bars: ErrorBars | None) -> dict[str, float]:
-    """The error bar of each statistic of a deviation, the greatest over the frames."""
+    """The greatest error bar over the frames, for each statistic of a deviation."""
     if bars is None:
         return {}
     worst = {f"{bar.metric}.{bar.statistic}": bar.worst.value for bar in bars.of_deviations}

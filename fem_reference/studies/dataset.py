@@ -62,7 +62,7 @@ class Sizes:
 
     @property
     def facts(self) -> dict[str, object]:
-        """Its identity, by which a build recognises the data set in a folder."""
+        """The identity of the data set, by which a build recognises it in a folder."""
         drawn = {"muscles": self.muscles, "poses": self.poses, "seed": self.seed, "shipped": list(self.shipped)}
         return {"version": VERSION, **drawn}
 
@@ -150,9 +150,7 @@ def unfit(bench: Bench[MuscleCase], run: Run, bars: error_bars.ErrorBars | None)
     # A small det F at the singular rim of an attachment does not make a run unfit: the error bars cover it.
     others = {key: values for key, values in run.scalars.items() if not key.startswith("min_det_F")}
     said = [f"{one.expectation.metric} {one.word}" for one in own if one.word != "pass"]
-    return "; ".join([*doubts(replace(run, scalars=others)), *said]) or (
-        "" if own else "the case has no expectations of it"
-    )
+    return "; ".join([*doubts(replace(run, scalars=others)), *said]) or ("" if own else "it has no expectations")
 
 
 def arrays(bench: Bench[MuscleCase], run: Run) -> Arrays:

@@ -1,4 +1,4 @@
-"""Loader of a data set of muscles: numpy alone; ``python load.py`` in its folder checks every file against its hash."""
+"""Loader of a data set of muscles, with numpy alone; ``python load.py`` in its folder checks every file against its hash."""
 
 import hashlib
 import json

@@ -1,6 +1,6 @@
-"""The report's estimation techniques (chapter 3) on the fibres, attachments and surface of a case: error against parameters.
+"""The report's estimation techniques (chapter 3) on the fibres, attachments and surface of a case: errors by parameters.
 
-The decompositions of a muscle into fibres (report 6.1.2) are compared with each other too: direction, length, points outside,
+The decompositions of a muscle into fibres (report 6.1.2) are also compared with each other: direction, length, points outside,
 crossings, and the reference's answer with each decomposition.
 """
 

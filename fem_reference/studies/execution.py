@@ -153,7 +153,7 @@ class Bench[C: Case]:
         return (reference, *(read.get(one.name) or self.obtain(one.name, one, place) for one, place in chosen))
 
     def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:
-        """The stored run that ``obtain`` would reuse; None if it would solve."""
+        """The stored run that ``obtain`` would reuse; None if ``obtain`` would solve."""
         other = Bench(self.scene, self.store, self.ranks)
         other._setup = self._setup
         return other._run(name, choice, place, lambda _: None)
@@ -187,9 +187,7 @@ class Bench[C: Case]:
         if self.scene.parts and wanted.choice.solver != "fenicsx":
             got = f'"{wanted.choice.solver}" for several muscles'
             raise InputError(
-                join(self.scene.place, "solver"),
-                got,
-                "the reference; compare solves each muscle alone with other solvers",
+                join(self.scene.place, "solver"), got, "the reference; in compare, others solve each muscle by itself"
             )
         if wanted.choice == self.scene.reference:
             self.check()

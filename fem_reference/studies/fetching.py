@@ -30,7 +30,7 @@ def known() -> Listed:
 
 def fetch(sources: Sequence[Path], folder: Path, wanted: Listed) -> list[str]:
     """Write each file of ``wanted`` that a source, a folder or an archive, contains into a new ``folder``, and return their paths
-    below it. Names in a source are ignored. InputError, and no folder, if none is found, a source is damaged or ``folder`` in use.
+    below it. Names in a source are ignored. InputError and no folder if none is found, a source is damaged or ``folder`` is in use.
     """
     found, files = set[str](), wanted.published | wanted.made
     sizes = {size for size, _ in files.values()}

@@ -1,4 +1,4 @@
-"""The error of a solver with tetrahedra as a sum of parts: effects left out, its law, its mesh, its convergence.
+"""The error of a solver with tetrahedra as a sum of parts: effects left out, its law, its mesh and its convergence.
 
 Intermediate references each change one part: without the effects, then in the solver's law, then on its linear tetrahedra.
 """

@@ -1,4 +1,4 @@
-"""New scenes: a copy of a case, or one made from the surfaces of a muscle and its bones."""
+"""New scenes: a copy of a case, or a scene made from the surfaces of a muscle and its bones."""
 
 import re
 import shutil
@@ -24,7 +24,7 @@ from fem_reference.scenes import casefile
 _GUESSED = ("mm", "cm", "m", "in")
 # The range of lengths of muscles and bones [mm]: a unit that gives another length is ruled out.
 _LONG = {"muscle": (20.0, 700.0), "bone": (5.0, 2500.0)}
-# The greatest distance of a muscle from its bones, in lengths of the muscle; at a greater one the files do not fit together.
+# The greatest distance of a muscle from its bones, in lengths of the muscle; at a greater distance the files do not fit together.
 _APART = 0.5
 # The share of vertices that are attached, those nearest to a bone; it is reduced if two attachments would share vertices.
 _ATTACHED = (0.06, 0.04, 0.025, 0.015, 0.008)
@@ -59,7 +59,7 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
     """Write a scene into a new ``folder``, which names it, with the surfaces in mm; return the unit in which they were read.
 
     ``muscle`` and ``bones`` are files of triangles. The muscle is attached to the two bones nearest to it, and the second of these
-    moves. ``unit``: that of all files, one of ``LENGTH_UNITS``; None: the only one that gives muscle and bones a usual length.
+    moves. ``unit``: the unit of all files, of ``LENGTH_UNITS``, or None: the only one that gives muscle and bones a usual length.
     InputError names the unusable file, or the value that cannot be guessed.
     """
     if len(bones) < 2:
@@ -124,7 +124,7 @@ def _new(folder: Path) -> Path:
 
 
 def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
-    """The only unit in which the size of every surface is possible; InputError if no unit or more than one is."""
+    """The only unit in which the size of every surface is possible; InputError if none or several are possible."""
     fitting, said = list[set[str]](), list[str]()
     for surface, kind in ((muscle, "muscle"), *((bone, "bone") for bone in bones)):
         size, (least, most) = diagonal(surface.points), _LONG[kind]

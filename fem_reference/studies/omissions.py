@@ -130,7 +130,7 @@ def _kept(case: MuscleCase, part: LeftOut) -> tuple[Effect, ...]:
 
 
 def fitting(element: str, effects: Sequence[Effect]) -> str:
-    """The element with the cells and the displacement of ``element`` that has a pressure if and only if an effect brings it."""
+    """The element with the cells and the displacement of ``element`` that has a pressure if and only if an effect adds it."""
     kind, degree, pressure = ELEMENTS[element]
     brings = any("pressure" in effect.unknowns for effect in effects)
     if (pressure is not None) == brings:

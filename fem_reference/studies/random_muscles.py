@@ -11,7 +11,7 @@ from fem_reference.io import files
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 
-EVERY = 10  # frame numbers from a pose to the next
+EVERY = 10  # frame numbers from one pose to the next
 _AROUND, _ALONG = 20, 21  # the vertices around and along every surface; vertex i is at the same part of each
 _TETS = 150  # the approximate number of tetrahedra, each of which is then cut into eight
 _MOTION = "motion = {{ {kind}, keyframes = [{keys}] }}\n"
@@ -85,7 +85,7 @@ def _turn(axis: Sequence[float], centre: Sequence[float], amounts: Floats) -> st
 
 
 def write(folder: Path, seed: int, number: int, poses: int) -> MuscleCase:
-    """Write muscle ``number`` of a ``seed`` into a ``folder``, with this number of random ``poses`` besides rest. The lower bone
+    """Write muscle ``number`` of a ``seed`` into a ``folder``, with a number of random ``poses`` besides rest. The lower bone
     turns about an axis beside the muscle. Of every three muscles, two have an upper bone that turns about another axis, one has an
     obstacle that slides into its side, and two are activated. The seed and the number determine all random values.
     """

@@ -42,7 +42,7 @@ from fem_reference.studies.variations import (
 log = logging.getLogger(__name__)
 
 EXACT = "exact attachments"
-# Files, besides the metrics, whose code makes error bars, or denies the runs that they come from.
+# Files, besides the metrics, whose code computes error bars or rejects the runs that they come from.
 _OF_BARS = [
     str(one.__file__) for one in (differences, error_bars, force_bars, views, second_check, run_checks, neighbours)
 ]
@@ -51,7 +51,7 @@ MAKING = (*map(Path, _OF_BARS), *map(Path(__file__).with_name, ("muscle_bars.py"
 # The coarse run of a scene with refined tetrahedra omits the last refinement; that of any other scene has its own mesh, with
 # tetrahedra larger by this factor.
 RATIO = 1.5
-# Error bars are computed unasked if they take at most this share of the reference's time, estimated by numbers of tetrahedra.
+# Without a request, error bars are computed only if they take at most this share of the reference's time, by tetrahedra.
 CHEAP = 0.2
 
 # A quadratic element has as many unknowns on the same cells as a linear one on cells of half the size, and does not lock.
@@ -138,7 +138,7 @@ def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | N
 
 
 def stored(reference: Run, muscle: str = "") -> ErrorBars | None:
-    """The error bars stored beside a reference run, of one ``muscle`` of several; None if none are of this run and metrics."""
+    """The error bars stored beside a reference run, of one ``muscle`` of several; None without bars of this run and metrics."""
     if reference.folder is None:
         return None
     folder = reference.folder / muscle
@@ -201,12 +201,10 @@ def solutions[C: DrivenCase](
 
 
 def check_coarser(bench: Bench[MuscleCase], fine: float, coarse: float) -> None:
-    """Raise InputError unless a mesh of ``coarse`` tetrahedra has fewer than one of ``fine``."""
+    """Raise InputError unless the number of ``coarse`` tetrahedra is below that of ``fine`` ones."""
     if not coarse < fine:
         got = f"meshes of {fine:.0f} and {coarse:.0f} tetrahedra"
-        raise InputError(
-            f"{bench.scene.place}: muscle.tet_size", got, "a size for which the coarser mesh has fewer tetrahedra"
-        )
+        raise InputError(f"{bench.scene.place}: muscle.tet_size", got, "a size that can be coarsened")
 
 
 def safety(bench: Bench[MuscleCase]) -> float:
@@ -222,7 +220,7 @@ def safety(bench: Bench[MuscleCase]) -> float:
 
 
 def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
-    """The case with larger tetrahedra, and the sizes [mm] of its own and of these."""
+    """The case with larger tetrahedra, and the sizes [mm] of its own and of the larger tetrahedra."""
     size, refinements = case.muscle.tet_size, case.muscle.refinements
     if refinements:
         larger = on_tetrahedra(case, refinements=refinements - 1)
@@ -279,9 +277,7 @@ def body_bars(solved: Run) -> BodyBars | None:
         log.info("error bars: with %s: %s, %s", sharper, found.outcome.status, found.outcome.message)
     states = () if found.outcome.status == "denied" else found.states
     bars = error_bars.body_bars(solved.states, states, shared, sharper)
-    log.info(
-        "error bars: displacement is known to %.2g %% of its magnitude at the last frame", 100 * bars.displacement[-1]
-    )
+    log.info("error bars: displacement is known to %.2g %% at the last frame", 100 * bars.displacement[-1])
     return bars
 
 

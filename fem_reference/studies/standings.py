@@ -111,9 +111,7 @@ def stand(
             missing[scene.name] = str(error)
     for one in entrants:
         if one.case not in ("", *asked):
-            missing[f"{one.case}, {one.candidate.name}"] = (
-                f"this case is not solved here; solved are only {', '.join(asked)}"
-            )
+            missing[f"{one.case}, {one.candidate.name}"] = f"not one of the cases solved here: {', '.join(asked)}"
     done = {row.case for row in rows}
     rows += [row.kept(row.case in missing) for row in before if row.case not in done]
     return Standings(rows=tuple(rows), missing=missing, changes=standings.changes(before, rows))
@@ -138,7 +136,7 @@ def _on(
 ) -> Iterator[Standing]:
     case, reference = bench.scene, complete(bench.reference(), bench.scene.numbers)
     if reference.outcome.status != "converged":
-        got = f"a reference with the status {reference.outcome.status}: {reference.outcome.message}"
+        got = f"a reference with status {reference.outcome.status}: {reference.outcome.message}"
         raise InputError(case.place, got, "one that reaches all frames")
     measured = _Measured(bench, reference, context_of(bench.setup(), reference), missing)
     truth = Candidate(name="reference", **case.reference.model_dump())

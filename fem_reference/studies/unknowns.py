@@ -12,8 +12,8 @@ from fem_reference.scenes.muscle import MuscleCase
 
 @dataclass(frozen=True)
 class Unknowns:
-    """A case as in its file (``whole``), whose effects the keys number, and the indices of the effects that act (``kept``): with
-    ``effects = "auto"``, in all runs, those that the case needs with its own values.
+    """A case as in its file (``whole``), whose keys refer to effects by number, and the indices of the effects that act (``kept``).
+    With ``effects = "auto"``, these are, in all runs, the effects that the case needs with its own values.
     """
 
     whole: MuscleCase

@@ -45,7 +45,7 @@ def on_larger[C: DrivenCase](case: C, ratio: float) -> C:
 
 
 def with_contact[C: DrivenCase](case: C, kind: type[Effect] = Contact, **changes: float) -> C:
-    """The case with other parameters of its contact, of a ``kind``: with bones, or of muscles with themselves or each other."""
+    """The case with other parameters of its contact of a ``kind``: with bones, or of muscles with themselves or each other."""
     effects = (one.model_copy(update=changes) if isinstance(one, kind) else one for one in case.effect)
     return case.model_copy(update={"effect": tuple(effects)})
 
@@ -70,7 +70,7 @@ def without_states(choice: SolverChoice) -> SolverChoice:
 
 
 def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
-    """The case on a surface of ``4**power`` times as many triangles; its files, named by their contents, go into ``folder``.
+    """The case on a surface with ``4**power`` times as many triangles; its files, named by their contents, go into ``folder``.
 
     A vertex is attached if the nearest vertex of the original surface is.
     """
@@ -93,7 +93,7 @@ def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> Muscle
 
 
 def nearest_vertices(surface: Surface, points: Floats) -> Floats:
-    """The nearest vertex of the nearest triangle to each of ``points`` (n, 3), (n,)."""
+    """The vertices (n,) nearest to ``points`` (n, 3): corners of the nearest triangles, by barycentric coordinates."""
     found = distances(points, surface)
     corners = surface.triangles[found.triangle]
     return np.asarray(np.take_along_axis(corners, found.barycentric.argmax(axis=1)[:, None], axis=1)[:, 0])

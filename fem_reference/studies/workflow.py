@@ -73,7 +73,7 @@ def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
     """Read frames that another program wrote, ``positions`` (f, n, 3) [mm] of the vertices of the case's muscle in the same order.
 
     ``folder``: a folder with a mesh per frame, or a file of a sequence; ``candidate.toml`` in it may state name and unit. ``unit``:
-    that of length, by default the unit in ``candidate.toml``, else mm. InputError if a file cannot be read completely, or its
+    the unit of length, by default that of ``candidate.toml``, else mm. InputError if a file cannot be read completely, or its
     vertices or its first frame are not those of the case.
     """
     arguments.check_case(case)
@@ -122,7 +122,7 @@ def error_bars(
 def compare(
     case: Case, reference: Run, candidates: Sequence[Run] = (), *, error_bars: ErrorBars | None = None
 ) -> Comparison:
-    """Measure candidates against the reference of a case, and judge its expectations.
+    """Measure candidates against the reference of a case, and judge the expectations of the case.
 
     A frame that a run did not reach is NaN, and never a pass. With ``error_bars`` of the reference, from :func:`error_bars`, a
     verdict that they leave in doubt is inconclusive. ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: ``values``

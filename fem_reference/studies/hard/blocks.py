@@ -27,7 +27,7 @@ from fem_reference.studies.hard.records import FACES, FIRST, Face, Hard, Hold, L
 # The default material of blocks: the usual matrix of muscle.
 MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible", bulk="10 MPa"))
 _LINES, _POINTS = 4, 9  # the number of measured lines of each block, and of points of each line
-# The bones of held faces are balls, far from everything: their radius and distance in sizes of the block.
+# The bones of held faces are balls far from the block; their radius and distance are in sizes of the block.
 _BALL, _AWAY = 0.01, 50.0
 _SAME = 1e-9  # the greatest rounding difference between equal motions of two holds, as a share of the block's size
 
@@ -168,9 +168,7 @@ def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> N
         off = [np.ptp([apply(end.bone.pose(frame), shared) for end in (one, other)], axis=0) for frame in frames]
         if not np.max(off, initial=0.0) <= _SAME * max(hard.block.size if hard.block else (1.0,)):
             got = f"{other.attachment}, which shares {len(both)} vertices with {one.attachment} and moves differently"
-            raise InputError(
-                join(hard.place, f"hold[{j}].face"), got, "a face without a common edge, or the same motion"
-            )
+            raise InputError(join(hard.place, f"hold[{j}].face"), got, "no common edge, or the same motion")
 
 
 def _lines(block: Lattice) -> Polylines:

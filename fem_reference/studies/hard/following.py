@@ -186,7 +186,7 @@ def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: So
 
 
 def _apart(one: Followed, other: Followed) -> float:
-    """The greatest distance of two runs over the frames of both [% of the body's size]."""
+    """The greatest distance between two runs over the frames of both [% of the body's size]."""
     both, off = min(len(one.numbers), len(other.numbers)), list[float]()
     for first, second in zip(one.bodies, other.bodies, strict=True):
         moved = second.positions[:both]

@@ -270,6 +270,6 @@ def _check_solvers(hard: Hard, task: Task) -> None:
 
 
 def _merged(table: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """``table`` with the keys of ``changes`` in place of its own, tables key by key."""
+    """``table`` with the keys of ``changes`` in place of its own; nested tables are merged key by key."""
     both = [key for key, value in changes.items() if isinstance(value, dict) and isinstance(table.get(key), dict)]
     return table | changes | {key: _merged(table[key], changes[key]) for key in both}

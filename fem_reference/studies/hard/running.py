@@ -75,9 +75,9 @@ def run(
     in_steps: bool = False,
     jitters: int = 0,
 ) -> Stress:
-    """Run every solver, or ``only`` these, and the user's ``own`` on each case, the reference first and also ``in_steps`` and on a
-    number of other meshes, ``jitters``. ``own``: with each solver, the effects that it models besides a law of the whole muscle,
-    None if unknown.
+    """Run every solver, or ``only`` the named ones, and the user's ``own`` on each case, the reference first. It also runs
+    ``in_steps`` and on ``jitters`` other meshes. ``own`` has, for each solver, the effects that it models besides a law of the
+    whole muscle, None if unknown.
     """
     begin, clock, cells = time.perf_counter(), MachineTime.now(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
