@@ -19,14 +19,7 @@ from fem_reference.verification.parts import NO_GRADIENT, clamped, control, neo_
 
 FRICTION, MU, BULK = 0.3, 0.01, 0.1  # coefficient, and moduli [MPa]
 WEIGHT, STIFFNESS, HEIGHT = 1e-4, 0.01, 0.5  # pressure under the block [MPa], contact stiffness [MPa/mm], height [mm]
-NEAR = (
-    0.9,
-    0.99,
-    0.999,
-    0.9999,
-    1.0002,
-    1.001,
-)  # tangents of the requested angles, divided by the coefficient of friction
+NEAR = (0.9, 0.99, 0.999, 0.9999, 1.0002, 1.001)  # tangents of the requested angles, in coefficients of friction
 LAW = ContactLaw("z0", STIFFNESS, 0.01, friction=FRICTION)
 
 
