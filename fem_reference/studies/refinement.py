@@ -265,7 +265,7 @@ def tets(run: Run, fact: str = "tets") -> float:
 def body_bars(solved: Run) -> BodyBars | None:
     """The error bars of a run by :func:`solve_body`; None if that did not converge."""
     if solved.outcome.status != "converged":
-        log.info("error bars: none, of a body that did not converge")
+        log.info("no error bars: the body did not converge")
         return None
     settings, body = solved.settings, solved.body
     assert isinstance(settings, fenicsx.BodySettings)  # FEniCSx solved the body
