@@ -12,8 +12,8 @@ __all__ = ["NAME", "Page", "of_comparison", "summary", "write"]
 
 
 def of_comparison(comparison: Comparison) -> Page:
-    """The page of a comparison of any kind; its numbers are ``measures.json`` and ``measures.csv``."""
-    from fem_reference.report import comparison_page, field_page  # these load matplotlib, which most verbs do not need
+    """The page of a comparison of any kind; its numbers are written to ``measures.json`` and ``measures.csv``."""
+    from fem_reference.report import comparison_page, field_page  # both load matplotlib, which most verbs do not need
 
     of_field = "field" in comparison.reference.carries
     return field_page.comparison_page(comparison) if of_field else comparison_page.page(comparison)

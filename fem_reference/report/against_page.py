@@ -26,7 +26,7 @@ MOST_CURVES = 8
 def page(versions: Versions, setup: Setup) -> Page:
     """The page of two versions of a solver on a case with this ``setup``."""
     current = versions.current
-    # Pictures of the frame with the greatest change: before, now, and the change, on one colour scale; or the missing software.
+    # Pictures of the frame with the greatest change (before, now and the change, on one colour scale), or the missing software.
     run, found = current.candidate, versions.place
     known = [one for one in versions.changes if one.word != "no number"]  # the greatest changes first
     shown = gallery.figures(setup, run.surface, _shots(versions, found[0])) if found and run.has_surface else ([], "")
@@ -63,7 +63,7 @@ def word(versions: Versions) -> str:
 def sentence(one: Change) -> str:
     """The change of a statistic in words."""
     if math.isinf(one.by):
-        return f"{title_of(one.name)} {'has no number any more' if one.by > 0 else 'has a number now'} in frame {one.frame}"
+        return f"{title_of(one.name)} {'no longer has a number' if one.by > 0 else 'has a number now'} in frame {one.frame}"
     then, now = number(abs(one.was[one.at])), number(abs(one.now[one.at]))
     bars = "" if math.isnan(one.in_bars) else f", {number(abs(one.in_bars))} times the error bar"
     other = "" if one.other is None else f", and {_by(one, one.other)}"
@@ -88,7 +88,7 @@ def place(versions: Versions) -> str:
     i, vertex, distance = versions.place
     x, y, z = versions.current.rest[vertex]
     at = f"vertex {vertex}, at rest at ({number(x)}, {number(y)}, {number(z)}) mm"
-    return f"{number(distance)} mm from where it was, in frame {versions.current.candidate.numbers[i]}: {at}"
+    return f"{number(distance)} mm from its earlier position, in frame {versions.current.candidate.numbers[i]}: {at}"
 
 
 def facts(versions: Versions) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Pages requested by a command: their names, which state the differences, and the index of all pages in a folder."""
+"""Pages requested by a command: their names, built from its options, and the index of all pages in a folder."""
 
 import hashlib
 import logging
@@ -14,15 +14,15 @@ from fem_reference.report.pages import Page, PageHead
 
 log = logging.getLogger(__name__)
 
-LONGEST = 100  # characters of the name of a page
-INDEX = "index"  # the name of the page of the index, and its kind
+LONGEST = 100  # the greatest number of characters in the name of a page
+INDEX = "index"  # the name of the index page, and its kind
 # Names of other HTML files in subfolders that are listed too.
 _OTHERS = ("report.html", "index.html")
 
 
 @dataclass(frozen=True)
 class Part:
-    """The ``words`` of a command line that determine its result, and the ``name`` that they add to the default name of its page."""
+    """The ``words`` of a command line that determine its result, and the ``name`` that they add to the default name of the page."""
 
     words: tuple[str, ...]
     name: str = ""
@@ -30,8 +30,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Asked:
-    """A page as a command requests it: the ``verb``, the ``base`` of its default name, the ``parts`` that determine it, and its
-    name ``page`` in its own folder, empty without such a folder.
+    """A page as a command requests it: the ``verb``, the ``base`` of its default name, the ``parts`` that determine it, and the
+    name ``page`` of its file if it has its own folder, else an empty text.
     """
 
     verb: str
@@ -62,7 +62,7 @@ def _plain(text: str) -> str:
 
 
 def written(asked: Asked, page: Page, folder: Path, name: str | None = None) -> tuple[Path, list[str]]:
-    """Write a page, under ``name`` if given, and the index, without overwriting other files; the path of the page, and messages."""
+    """Write a page, under ``name`` if given, and the index, but keep other files; return the path of the page, and messages."""
 
     def where(name: str) -> Path:
         return folder / name / f"{asked.page}.html" if asked.page else folder / f"{name}.html"
@@ -93,7 +93,7 @@ def write_index(folder: Path) -> None:
     path = folder / f"{INDEX}.html"
     there = pages.read(path)
     if path.exists() and (there is None or there.kind != INDEX):
-        log.info("no index was written: %s is not an index by fem_reference, and is kept", path)
+        log.info("no index was written: %s is not an index made by fem_reference and is kept", path)
         return
     pages.write(index(*entries_of(folder)), folder, INDEX)
 

@@ -29,7 +29,7 @@ def columns(case: Case, setup: Any) -> list[Column]:
 
 
 def motions(bones: Iterable[Bone]) -> list[Column]:
-    """The angle [°] by which each bone that moves is turned, or the distance [mm] by which it is shifted."""
+    """The angle [°] by which each moving bone is turned, or the distance [mm] by which it is shifted."""
     found = list[Column]()
     for bone in bones:
         motion = bone.motion

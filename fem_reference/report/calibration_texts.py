@@ -20,13 +20,13 @@ def text(found: Calibration) -> str:
         best = [f"  {one.parameter.title}: {one.value:.5g} {one.parameter.unit}".rstrip() for one in found.estimates]
         return "\n".join([*lines, *best])
     if not found.converged:
-        lines.append("  not converged: a step could still lead nearer to the measurements")
+        lines.append("  not converged: a further step could reduce the residuals")
     lines += [_line(one) for one in found.estimates]
     lines.append(
-        f"  residuals scatter by {number(found.scatter)} of the standard deviations of the data{_remark(found.scatter)}"
+        f"  scatter of the residuals: {number(found.scatter)} standard deviations of the data{_remark(found.scatter)}"
     )
     lines += [
-        f"  not determined apart: {one} and {other}, whose errors are correlated by {correlation:.3f}"
+        f"  not determined separately: {one} and {other}, whose errors are correlated by {correlation:.3f}"
         for one, other, correlation in found.pairs
     ]
     values = ", ".join(number(one) for one in found.singular)
@@ -41,9 +41,7 @@ def _line(one: Estimate) -> str:
     )
     if one.at:
         end = getattr(one.parameter, one.at)
-        return (
-            f"{said}: at the {one.at} end of its range, {end:.5g}{unit}, so neither it nor its interval is meaningful"
-        )
+        return f"{said}: at the {one.at} end of its range, {end:.5g}{unit}, so neither value nor interval is meaningful"
     return said if one.is_known else f"{said}: not determined by these measurements"
 
 

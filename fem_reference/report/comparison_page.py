@@ -45,7 +45,7 @@ def _failed(comparison: Comparison) -> str:
     kept = reached_frames(reference)
     why = f"{reference.outcome.message.rstrip('.')}."
     if not len(kept):
-        return f"{why} No frame was reached, so nothing could be measured against it."
+        return f"{why} No frame was reached, so nothing could be compared with it."
     if reference.outcome.status == "denied":
         return f"{why} The measures below are relative to states that are not a valid truth."
     last = label(comparison.scene, comparison.setup, reference.numbers[kept[-1]])

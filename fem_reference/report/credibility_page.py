@@ -1,4 +1,4 @@
-"""The page ``credibility``: evidence for each quantity, as in NIST's study of fire models and in ASME V&V 40."""
+"""The page ``credibility``: evidence for each quantity, in the manner of NIST's study of fire models and of ASME V&V 40."""
 
 import math
 from collections import Counter
@@ -23,7 +23,7 @@ GRADES = {
     "outside": "the model differs from a measurement of muscle by more than its uncertainty, or a measured moment arm is not "
     "within the range of the fibres in all poses",
     "verified only": "the equations are solved correctly; no measurement of muscle is compared with it",
-    "not measured": "the data of its experiment is not installed",
+    "not measured": "the data of its experiment are not installed",
 }
 
 
@@ -66,8 +66,8 @@ def met(values: Mapping[str, float], one: Beside) -> bool | None:
 
 
 def differences(row: Row, arms: Iterable[ArmsBeside]) -> str:
-    """The number of measured values that the model misses on either side, and the distances: for moment arms the mean over the
-    poses of each case in mm, otherwise in uncertainties of the measurement. Wrong orders are counted separately.
+    """The number of measured values that the model misses on either side, and the distances. For moment arms they are means over
+    the poses of each case in mm, otherwise they are in units of the measurement's uncertainty. Wrong orders are counted separately.
     """
     own = [one for one in row.beside if one.kind == "measurement"]
     orders, numbers = ([one for one in own if one.is_order is kind] for kind in (True, False))

@@ -43,8 +43,8 @@ def label_of(inverted: Measure) -> str:
 
 
 def _of_runs(comparison: Comparison, key: tuple[str, str], title: str, i: int | None = None) -> Drawing | None:
-    """A measure of every run from rest, with the error bar of the reference; over frames, or over the angle of joint ``i`` at the
-    frames in which only this joint rotates. None if nothing is known.
+    """The change of a measure from rest for every run, with the error bar of the reference; over frames, or over the angle of joint
+    ``i`` in the frames in which only this joint rotates. None if nothing is known.
     """
     context, numbers = comparison.context, comparison.reference.numbers
     measures = {run.name: find(comparison.changes[run.name], *key) for run in comparison.runs}
@@ -80,7 +80,7 @@ def _draw_runs(
 
 
 def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:
-    """The ends of the common axis [mm] of the surfaces of all candidates; True if it is logarithmic, as they differ much."""
+    """The ends [mm] of the axis that the surfaces of all candidates share; True if they differ so much that it is logarithmic."""
     wanted = [("surface_deviation", statistic) for statistic, _, _ in _STATISTICS]
     tops = []
     for measures in comparison.deviations.values():

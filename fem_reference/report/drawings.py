@@ -20,8 +20,8 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.report.words import number
 
 REFERENCE = "#222222"
-# Okabe and Ito's palette for all kinds of colour vision, without black and yellow; then the muted colours of Tol that differ from
-# these; then colours in between. style.css has variants of all for dark pages.
+# First the palette of Okabe and Ito for all kinds of colour vision, without black and yellow; then the muted colours of Tol that
+# differ from it; then colours in between. style.css has variants of all for dark pages.
 PALETTE = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255"),
     *("#999933", "#332288", "#777777", "#7a4a1e", "#951afe", "#1e5b09", "#d81b8c", "#1fb80d"),
@@ -72,7 +72,7 @@ class Drawing:
 
 
 def colour_of(i: int) -> str:
-    """The i-th colour: 0 is the colour of the reference; then follow the palette and ever darker shades of it.
+    """The i-th colour: 0 is the colour of the reference; the palette and ever darker shades of it follow.
 
     >>> colour_of(0), colour_of(1), colour_of(16)
     ('#222222', '#0072b2', '#004c77')
@@ -133,7 +133,7 @@ def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], 
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
-    """Add a legend above in as many columns as fit, with the mark of NaN last; beyond three rows the figure grows."""
+    """Add a legend above in as many columns as fit, with the mark of NaN last; with more than three rows the figure grows."""
     entries = sorted(zip(*axes.get_legend_handles_labels(), strict=True), key=lambda entry: entry[1] == NOT_A_NUMBER)
     handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
     lengths = [len(label) + 7 for label in labels]

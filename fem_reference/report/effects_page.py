@@ -66,7 +66,7 @@ def phases(found: CaseOmissions) -> list[str]:
 
 
 def sentences(found: CaseOmissions, ablation: Ablation) -> list[str]:
-    """The changes by leaving out effects or features of a run, in sentences."""
+    """The changes due to leaving out effects or features of a run, in sentences."""
     if ablation.whole.status != "converged":
         return [f"Nothing was left out, as the whole run {ablation.whole.status}: {ablation.whole.message}"]
     if not ablation.omissions:

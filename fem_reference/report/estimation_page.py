@@ -49,7 +49,7 @@ def said(found: Estimation) -> str:
     most = max((one.gaussians for one in found.fits), default=0)
     if fits := [one for one in found.fits if one.gaussians == most]:
         sentences.append(
-            f"{most} Gaussians miss a muscle's surface by "
+            f"{most} Gaussians deviate from a muscle's surface by "
             f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms with "
             f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer numbers"
         )

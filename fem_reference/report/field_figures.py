@@ -44,7 +44,7 @@ def drawings(example: Comparison) -> list[Drawing]:
 
 
 def convergence(example: Comparison) -> Drawing:
-    """Error over number of cells, a line for each element."""
+    """Error against the number of cells, with a line for each element."""
     title = "Error as the mesh is refined"
     lines = [(one.element, *positive(np.array(one.cells, float), np.array(one.errors))) for one in example.ladders]
     if not any(len(cells) for _, cells, _ in lines):
@@ -107,7 +107,7 @@ def _sorted(run: Run, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _look(i: int, run: Run) -> dict[str, Any]:
-    """The style of a line: for the listing the style of its ``plot`` command, otherwise by the index of the run."""
+    """The style of a line: for the listing the style of its ``plot`` command, otherwise a style by the index of the run."""
     if run.solver == "listing":
         return dict(_LISTING)
     marker = _MARKERS[i % len(_MARKERS)]
@@ -139,7 +139,7 @@ def _panels(example: Comparison, draw: Callable[..., None]) -> Iterator[Drawing]
         if np.isfinite(values).all():
             yield _webp(title, partial(draw, example=example, values=values, scale_of=scale_of, colours=colours))
         else:
-            yield Drawing(title, missing="its values are not a number")
+            yield Drawing(title, missing="its values are not numbers")
 
 
 def _called(run: Run) -> str:
@@ -197,7 +197,7 @@ class _Window:
 
     @property
     def half(self) -> tuple[float, float]:
-        """Half its width and height: a square, narrower if it is higher than wide."""
+        """Half the window's width and height: a square, narrower if the part is higher than wide."""
         width, height = (float(length) for length in 0.53 * (self.high - self.low)[:2])
         height = max(width, height)
         return max(width, height / 2), height
@@ -247,7 +247,7 @@ def _front(mesh: FieldMesh, values: Floats, scale: ScalarMappable, line: float) 
     faces = np.asarray(scale.to_rgba(values[mesh.cells].mean(axis=1)))
     faces[:, :3] *= (0.55 + 0.45 * light)[:, None]
     order = np.argsort(corners[:, :, 2].mean(axis=1))
-    # Triangles get an edge of their own colour; without it the white background shows between them.
+    # Triangles get edges in their own colour; without them the white background shows between triangles.
     edges: Any = (0, 0, 0, 0.5) if line else faces[order]
     shown = list(corners[order, :, :2])
     return PolyCollection(shown, facecolors=faces[order], edgecolors=edges, linewidths=line or 0.2)

@@ -77,7 +77,7 @@ def apart(example: Comparison) -> str:
 
 
 def bounds(run: Run) -> tuple[float, float] | tuple[None, None]:
-    """The least and the greatest value at a vertex, NaN if one is not a number; None if the run failed."""
+    """The least and the greatest value at a vertex, NaN if any value is not a number; None if the run failed."""
     if _lost(run):
         return None, None
     return float(run.vertex_values[-1].min()), float(run.vertex_values[-1].max())

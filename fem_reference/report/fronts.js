@@ -1,5 +1,5 @@
 "use strict";
-// Error against cost of the points in #study, for each .free on the page: the reader chooses which error and which cost.
+// Error against cost of the points in #study, for each .free on the page; the reader chooses the error and the cost.
 (() => {
   const study = JSON.parse(document.getElementById("study").textContent);
   const W = 860, H = 480, LEFT = 76, RIGHT = 190, TOP = 14, BOTTOM = 52;
@@ -9,7 +9,7 @@
   function element(name, attributes, inside = "") {
     const made = document.createElementNS("http://www.w3.org/2000/svg", name);
     for (const [key, value] of Object.entries(attributes)) {
-      if (/^#[0-9a-f]{6}$/.test(value)) made.style[key] = `var(--c-${value.slice(1)}, ${value})`; // as the page has it
+      if (/^#[0-9a-f]{6}$/.test(value)) made.style[key] = `var(--c-${value.slice(1)}, ${value})`; // the page's variant of the colour
       else made.setAttribute(key, value);
     }
     if (inside) made.textContent = inside;
@@ -36,7 +36,7 @@
     return { at, ticks };
   }
 
-  function front(points, error, cost, bar) { // [cost, error] that no other beats in both, the cheapest first; below the bar all are alike
+  function front(points, error, cost, bar) { // pairs [cost, error] that no other pair beats in both, the cheapest first; errors below the bar count as equal
     let best = Infinity;
     return points.map(point => [point.costs[cost], Math.max(point.errors[error], bar)])
       .sort((a, b) => a[0] - b[0] || a[1] - b[1])
@@ -48,7 +48,7 @@
     const svg = element("svg", { viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": `${words(error)} against ${words(cost)}` });
     place.replaceChildren(svg);
     if (!points.length) {
-      svg.append(element("text", { x: 20, y: 40, fill: "currentColor" }, "No solver has both."));
+      svg.append(element("text", { x: 20, y: 40, fill: "currentColor" }, "No solver has both values."));
       return;
     }
     const bar = found.bars[error] || 0;

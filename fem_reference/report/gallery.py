@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
 SECONDS = 600  # time limit of the drawing program
-# Principal moments that differ by less than this share, far above round-off, count as equal; then coordinate axes are chosen.
+# Principal moments with a relative difference below this, far above round-off, count as equal; coordinate axes are used then.
 _TIES = 1e-11
 
 
@@ -58,12 +58,12 @@ def shots(comparison: Comparison) -> list[Shot]:
 
 
 def of_comparison(comparison: Comparison) -> tuple[list[Shot], str]:
-    """The figures of the runs of a comparison, each at its worst frame; if software is missing, no figures and its name."""
+    """The figures of the runs of a comparison, each at its worst frame; if software is missing, no figures and a message."""
     return figures(comparison.setup, comparison.reference.surface, shots(comparison))
 
 
 def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Shot], str]:
-    """The figures of ``wanted``; if software is missing, no figures and its name."""
+    """The figures of ``wanted``; if software is missing, no figures and a message."""
     try:
         drawn = draw(setup, surface, wanted)
     except MissingSoftware as error:
@@ -73,14 +73,14 @@ def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Sh
 
 
 def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes, bytes]]:
-    """Two WebP pictures of each shot; MissingSoftware if the drawing program failed."""
+    """Two WebP pictures of each shot; raises MissingSoftware if the drawing program fails."""
     with scratch_folder() as folder:
         job = folder / "job.pickle"
         job.write_bytes(pickle.dumps(_job(setup, surface, wanted)))
         _run(program(job, folder))
         names = [[folder / f"{shot}_{view}.webp" for view in (0, 1)] for shot in range(len(wanted))]
         if not all(path.is_file() for pair in names for path in pair):
-            raise _missing("it left no pictures")
+            raise _missing("it wrote no pictures")
         return [(first.read_bytes(), second.read_bytes()) for first, second in names]
 
 
@@ -115,7 +115,7 @@ def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
     """Unit vectors (2, 3) towards the cameras: along the smallest and the middle principal axis of the surface.
 
     The first view has the largest silhouette; the second is a quarter turn away about the long axis. Both cameras are on the
-    side away from the bones' vertices. An axis along which a bone of closed form hides the surface comes last.
+    side away from the bones' vertices. An axis along which a bone given in closed form hides the surface comes last.
     """
     middle = surface.points.mean(axis=0)
     spread = np.cov((surface.points - middle).T)
@@ -130,7 +130,7 @@ def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
 
 
 def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
-    """True if bones of closed form hide most of ``points`` (n, 3), within four times ``view`` (3,) towards the camera."""
+    """True if bones given in closed form hide most of ``points`` (n, 3) within four times ``view`` (3,), towards the camera."""
     behind = np.zeros(len(points), bool)
     for solid in (bone.solid for bone in bones if bone.solid is not None):
         for step in np.arange(1, 17) / 4:
@@ -167,7 +167,7 @@ def _job(setup: Setup, surface: Surface, wanted: list[Shot]) -> dict[str, Any]:
 
 
 def program(job: Path, folder: Path) -> list[str]:
-    """The words that start the program which draws ``job`` into ``folder``."""
+    """The command line of the program that draws ``job`` into ``folder``."""
     return command(pictures.__file__, str(job), str(folder))
 
 
@@ -182,12 +182,12 @@ def _run(words: list[str]) -> None:
     except (OSError, subprocess.TimeoutExpired) as error:
         raise _missing(str(error)) from error
     if done.returncode:
-        log.info("the program that draws wrote: %s", done.stderr)
+        log.info("the drawing program wrote: %s", done.stderr)
         raise _missing(f"it ended with code {done.returncode}")
 
 
 def _missing(what: str) -> MissingSoftware:
     return MissingSoftware(
-        f"No pictures: the program that draws them failed ({what}). It needs an OpenGL library; "
+        f"No pictures: the drawing program failed ({what}). It needs an OpenGL library; "
         f"on Debian or Ubuntu: apt-get install {PACKAGES}"
     )

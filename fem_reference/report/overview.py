@@ -52,7 +52,7 @@ def comparison_text(result: Comparison) -> str:
 
 
 def _judged(verdict: Verdict) -> str:
-    """A verdict as a line of text, with more digits for a number without a unit."""
+    """A verdict as a line of text; a number without a unit has more digits."""
     expected = verdict.expectation
     if verdict.unit == "1":
         truth = f"expected {verdict.truth:.6g} within {verdict.within:.3g}"
@@ -90,7 +90,7 @@ def _worst(result: Comparison) -> list[str]:
 
 
 def _known(result: Comparison) -> list[str]:
-    """Error bars of the reference, one line for each statistic; nothing without error bars."""
+    """Error bars of the reference, one line for each statistic; no lines without error bars."""
     if result.error_bars is None:
         return []
     lines = ["error bars of the reference (its greatest change from rest, and the widest error bar of that change):"]

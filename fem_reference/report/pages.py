@@ -1,4 +1,4 @@
-"""The record of a page, its template, its writing, and its head, a description that is shown in the index.
+"""Pages: their record, their templates, their writing, and their head, a description that the index shows.
 
 Only the command that made a page overwrites it.
 """
@@ -27,7 +27,7 @@ from fem_reference.report import gallery
 from fem_reference.report.embedded import webp
 from fem_reference.report.words import duration, listed, number, ratio, title_of, words
 
-# Places in the frame of all pages (base.html): of the facts, and of the command that made the page.
+# Placeholders in the template of all pages (base.html) for the facts and for the command that made the page.
 _FACTS, _ASKED = "<!-- facts of the page -->", "<!-- what was asked -->"
 _BEGIN, _END = '<script type="application/json" id="page-facts">', "</script>"
 _HEAD = 2**17  # the number of bytes at the beginning of a file that are searched for the facts
@@ -75,7 +75,7 @@ class PageHead:
 def write(page: Page, folder: Path, name: str, asked: str = "") -> Path:
     """Write the page ``name`` and its numbers into ``folder``; return its path.
 
-    All files are made before the first is written, and each is written completely or not at all.
+    All contents are made before the first file is written, and each file is written completely or not at all.
     """
     beside = page.numbers_name or name
     texts = {} if page.numbers is None else {f"{beside}.json": json.dumps(page.numbers, indent=1, allow_nan=False)}
@@ -98,7 +98,7 @@ def stamped(page: Page, asked: str = "") -> str:
 
 
 def read(path: Path) -> PageHead | None:
-    """The head of the page at ``path``; None if there is no page by this package, or if it is damaged."""
+    """The head of the page at ``path``; None if the file is not a page of this package or is damaged."""
     if not path.is_file():  # reading a pipe would block
         return None
     try:
@@ -117,7 +117,7 @@ def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]
         numbered = name if i == 1 else f"{name}-{i}"
         path = where(numbered)
         if not path.exists():
-            return numbered, "" if i == 1 else f"{where(name)} was made by another command, and is kept"
+            return numbered, "" if i == 1 else f"{where(name)} was made by another command and is kept"
         head = read(path)
         if head is not None and head.asked == asked:
             return numbered, f"replaces the page that the same command made on {head.made}"

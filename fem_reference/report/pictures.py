@@ -85,7 +85,7 @@ def _render(bodies: list[tuple[Any, dict[str, Any]]], camera: dict[str, Any]) ->
     import pyvista
 
     plotter = pyvista.Plotter(off_screen=True, window_size=[SIDE * _OVERSAMPLING] * 2)
-    # More samples would take four fifths of the time, and oversampling smooths edges too.
+    # Multisampling would take four fifths of the drawing time; the oversampling already smooths edges.
     plotter.render_window.SetMultiSamples(1)
     plotter.set_background("white")
     for body, looks in bodies:

@@ -24,7 +24,7 @@ _MARKS = "osD^vPX*<>"
 
 
 def page(table: Table) -> Page:
-    """The page over the kinds of solvers."""
+    """The page of all kinds of solvers."""
     contents = {
         "table": table,
         "columns": COLUMNS,
@@ -44,7 +44,7 @@ def _load(table: Table) -> str:
 
 
 def facts(table: Table) -> dict[str, Any]:
-    """All of it as valid JSON: a number that is not finite is None."""
+    """The contents of the page as valid JSON: a number that is not finite is None."""
     scenarios = [
         {"case": one.case, "triangles": one.triangles, "travel_mm": one.travel}
         | {"reference": one.reference.status, "message": one.reference.message}
@@ -91,7 +91,7 @@ def _row(one: SolverResult) -> dict[str, Any]:
 
 
 def _drawing(table: Table) -> Drawing:
-    """Deviation of the surface against the time of a frame, for every solver on every scene; with legends of colours and marks."""
+    """Deviation of the surface against the time per frame, for every solver on every scene; with legends of colours and marks."""
     shown = [(one, place) for one in table.results if (place := _place(one)) is not None]
     # The reference is drawn first.
     colours = looks(_label_of(one) for one, _ in sorted(shown, key=lambda pair: not pair[0].of_reference))

@@ -34,7 +34,7 @@ def facts(found: Recommendation, metric: str) -> dict[str, object]:
 
 
 def text(found: Recommendation, case: str, metric: str, unit: str, limit: float) -> str:
-    """The setting, or that nearest to the ``limit`` of the error, with its error in a ``unit``, its time and its evidence."""
+    """The setting, or the one nearest to the ``limit`` of the error, with its error in a ``unit``, its time and its evidence."""
     alike = "the studied case" if len(found.of) == 1 else "the studied cases"
     measured = "measured on it" if found.measured else f"expected from {listed(list(found.of))}, {alike} most like it"
     one, lines = found.best or found.nearest, list[str]()
@@ -101,7 +101,7 @@ def _answer(one: Answer, unit: str) -> str:
 
 
 def _parts(one: Expected, unit: str, *, measured: bool) -> str:
-    """The parts of an error: measured on the case itself, and the bar of the truth."""
+    """The parts of an error: the part measured on the case itself, and the bar of the truth."""
     if not measured:
         return " with margins and the bars of the truths"
     if not one.bar > 0:
@@ -118,7 +118,7 @@ def _reason(one: Expected, unit: str, limit: float) -> list[str]:
         return [f"the truth itself is known only to {known}: no smaller error can be proven"]
     if one.error > limit >= one.error - one.bar:
         within = f"{number(limit)} {unit}"
-        return [f"without the bar it would be within the {within}: the error bar of the truth is too large to decide"]
+        return [f"without the bar, the error would be within {within}: the bar of the truth is too large to decide"]
     return []
 
 

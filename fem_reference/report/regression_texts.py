@@ -1,4 +1,4 @@
-"""A check in words: as text, JSON, Markdown for a pull request, and JUnit XML for the test page of a pipeline."""
+"""A regression check as text, JSON, Markdown for a pull request, and JUnit XML for the test page of a pipeline."""
 
 import math
 from typing import Any
@@ -66,8 +66,8 @@ def markdown(check: Check) -> str:
 
 
 def junit(check: Check, seconds: float) -> str:
-    """A suite for the candidate, with a test case for each judgement, skipped if inconclusive. ``seconds``: the time of the check.
-    The verdict and the doubts about the reference are properties of the suite: a doubtful pass is no failure.
+    """A suite for the candidate, with a test case for each judgement, skipped if inconclusive. ``seconds`` is the check's time.
+    The verdict and the doubts about the reference are properties of the suite: a doubtful pass is not a failure.
     """
     counts = {"tests": len(check.judgements), "failures": check.count("fail"), "errors": 0}
     counts |= {"skipped": check.count("inconclusive")}

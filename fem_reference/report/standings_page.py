@@ -1,4 +1,4 @@
-"""The page ``standings``: solvers of all kinds over cases, one table on top, and a table of each case."""
+"""The page ``standings``: solvers of all kinds, in one table over all cases and in a table for each case."""
 
 from fem_reference.assessment.standings import ERROR, MATCHED_ERROR, MATCHED_TIME, Standing, Standings
 from fem_reference.metrics import described

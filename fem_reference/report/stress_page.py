@@ -77,7 +77,7 @@ def picture(scene: Scene) -> str:
 
 
 def _colour(facing: float) -> tuple[int, int, int]:
-    """The colour of a triangle whose normal has this component along the view: below 0 its outer side is visible."""
+    """The colour of a triangle whose normal has this component along the view: if it is negative, the outer side is visible."""
     if facing > 0:
         return _BACK
     red, green, blue = (round(dark + (lit - dark) * -facing) for dark, lit in zip(_DARK, _LIT, strict=True))

@@ -1,4 +1,4 @@
-"""The page of a study: error against cost, the best solver at the same cost or error, the cost of half the error."""
+"""The page of a study: error against cost, the best solver at the same cost or error, and the cost of half the error."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -25,7 +25,7 @@ from fem_reference.report.words import title_of as in_words
 
 REFERENCE = "fenicsx"
 TIME = "seconds_per_frame"
-# The statistic in the tables, and the quantities at whose equal values the tables compare solvers.
+# The statistic in the tables, and the quantities at equal values of which solvers are compared.
 MAIN = next(map(".".join, described("rank")))
 MATCHED = (TIME, "peak_memory_mb", "unknowns")
 
@@ -64,12 +64,12 @@ def page(study: Study) -> Page:
         for case in study.cases
         for text in answer_texts(answered(case), case.units[MAIN])
     )
-    title = "What accuracy costs" + (f": {study.cases[0].title}" if one else "")
+    title = "The cost of accuracy" + (f": {study.cases[0].title}" if one else "")
     return Page("study", title, said, "study_page.html", contents, one or cases)
 
 
 def shown(case: CaseStudy) -> list[str]:
-    """The statistics with a front: statistics with errors of two or more points (a case without joints has no moment arms)."""
+    """The statistics with a front: those with errors at two or more points (a case without joints has no moment arms)."""
     known = [name for point in case.points for name in point.errors]
     return [name for name in map(".".join, described("rank")) if known.count(name) > 1]
 
@@ -99,7 +99,7 @@ def sentences(case: CaseStudy, error: str = MAIN) -> list[str]:
 def _sentence(one: Price, unit: str, bar: float) -> str:
     best, label, time = f"{number(one.best)} {unit}", one.nearest.label, duration(one.nearest.costs[TIME])
     if one.best <= bar and not one.is_measured:
-        return f"The error of {one.solver} is within the bar of the truth, {best}, from {time} a frame on ({label})."
+        return f"The error of {one.solver} is within the bar of the truth, {best}, at {time} a frame or more ({label})."
     reach = f"{one.count} settings, from {number(one.worst)} {unit} to {best} with {label}, {time} a frame"
     if one.factor > 1:
         verb = "costs" if one.is_measured else "would cost"
@@ -110,7 +110,7 @@ def _sentence(one: Price, unit: str, bar: float) -> str:
 
 
 def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Match]]]:
-    """Tables at the same time, memory, unknowns and error: the common quantity, the compared quantity, and the rows."""
+    """Tables at equal time, memory, unknowns and error: the common quantity, the compared quantity, and the rows."""
     asked = [(case.counted, cost, cost, error) for cost in MATCHED]
     # An error of "at most" a value includes the bar of the truth, as in the verb recommend.
     asked.append((case.certain, TIME, error, TIME))
@@ -141,7 +141,7 @@ def as_measured(case: CaseStudy, point: Point, error: str) -> float | None:
 
 
 def left_out(case: CaseStudy) -> list[Point]:
-    """The points that did not reach all frames or were refused, and so are on no front."""
+    """The points that did not reach all frames or were refused, and are therefore on no front."""
     return [point for point in case.points if point.status != "converged"]
 
 
@@ -181,7 +181,7 @@ def _draw_answers(axes: Axes, found: Iterable[Answer]) -> None:
 
 
 def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
-    """Pairs of each point with its measured error, which may be below the bar of the truth, and with the error that counts."""
+    """Each point twice: with its measured error, which may be below the bar of the truth, and with the error that counts."""
     return [
         (replace(point, errors=point.errors or counted.errors), counted)
         for point, counted in zip(case.points, case.counted, strict=True)
@@ -189,7 +189,7 @@ def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
 
 
 def _draw(axes: Axes, points: Sequence[tuple[Point, Point]], error: str, solver: str, colour: str) -> None:
-    """Draw the points of a solver, its front by the errors that count as a line, and its default settings as rings."""
+    """Draw the points of a solver, the front of the errors that count as a line, and its default settings as rings."""
     pairs = [(point, pair) for point, _ in points if (pair := point.at(error, TIME))]
     if not pairs:
         return

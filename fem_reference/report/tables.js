@@ -1,10 +1,10 @@
 "use strict";
-// Tables that sort: a click on the head of a column, or Enter on it, sorts by it, the next one the other way round. What is no
-// number comes last. Left alone are tables of one row, those whose rows belong together, and those marked data-fixed.
+// Sortable tables: a click on the head of a column, or Enter on it, sorts by this column; the next click reverses the order.
+// Entries that are not numbers come last. Tables of one row, of connected rows, or marked data-fixed cannot be sorted.
 (() => {
   const DIGITS = "⁰¹²³⁴⁵⁶⁷⁸⁹", SCALE = { ms: 1e-3, s: 1, min: 60 };
 
-  function text(cell) { // what a cell says first: not what stands small below it
+  function text(cell) { // the main text of a cell, without its small print
     const copy = cell.cloneNode(true);
     for (const small of copy.querySelectorAll("small")) small.remove();
     return copy.textContent.trim();
@@ -14,7 +14,7 @@
     return Number([...raised].map(one => one === "⁻" ? "-" : DIGITS.indexOf(one)).join(""));
   }
 
-  function number(said) { // NaN where it begins with none
+  function number(said) { // NaN if the text does not begin with a number
     const plain = said.replace(/\u2212/g, "-").replace(/(\d)[\u202f\u2009 ](?=\d{3})/g, "$1");
     const found = plain.match(/^[±<>~]?\s*(-?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(?:\s*×\s*10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+|-?\d+))?\s*(.*)$/);
     if (!found) return /^-?infinite/.test(plain) ? (plain[0] === "-" ? -Infinity : Infinity) : NaN;
@@ -22,7 +22,7 @@
     return Number(found[1]) * 10 ** raised * (SCALE[found[3]] ?? 1);
   }
 
-  function groups(body) { // a row with the rows that go on with what it says
+  function groups(body) { // each row with the rows that continue it
     const found = [];
     for (const row of body.rows) row.classList.contains("more") && found.length ? found.at(-1).push(row) : found.push([row]);
     return found;
@@ -61,6 +61,6 @@
   }
 
   for (const table of document.querySelectorAll("table")) sortable(table);
-  for (const wide of document.querySelectorAll(".wide, figure, .plot")) // what scrolls can be scrolled with the keyboard
+  for (const wide of document.querySelectorAll(".wide, figure, .plot")) // elements that scroll can be scrolled with the keyboard
     new ResizeObserver(() => wide.scrollWidth > wide.clientWidth ? wide.setAttribute("tabindex", "0") : wide.removeAttribute("tabindex")).observe(wide);
 })();

@@ -24,8 +24,8 @@ DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in describ
 
 # The same springs at points of the surface and over facets of the tetrahedra, on gluteus_medius and gluteus_maximus at 1 rad.
 SPREAD = (
-    "Attachments are springs, and 5 to 9 % of a force or moment depend on how the same springs are spread over them "
-    "(5.3 and 8.8 % on two muscles of the hip): the error bars of forces and moments leave that out, and state it as another model"
+    "Attachments are springs, and 5 to 9 % of a force or moment depend on how the same springs are spread over them (5.3 "
+    "and 8.8 % on two muscles of the hip): error bars of forces and moments exclude it and report it as the effect of another model"
 )
 
 
@@ -35,7 +35,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     ``measures``: each candidate's deviation from the reference; under ``"reference"`` the reference's change from rest, with its
     recorded forces and inversion numbers. ``doubts``: the reasons to doubt the reference, in words. ``from_rest``: the change from
     rest of every run, with its forces. ``error_bars``: bars of the reference; ``rankings``: the solvers that the bars separate;
-    both are empty without bars. ``unsound``: the reasons why the frames of candidates are no answer.
+    both are empty without bars. ``unsound``: the reasons why frames of candidates are not valid.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
@@ -71,7 +71,7 @@ def _head(case: Case, run: Run, word: Word) -> dict[str, Any]:
 
 
 def as_csv(rows: Iterable[dict[str, Any]]) -> str:
-    """Rows of ``COLUMNS`` as CSV text, numbers in full; a number that is not finite is left empty."""
+    """Rows of ``COLUMNS`` as CSV text, with all digits; a number that is not finite is left empty."""
     text = io.StringIO()
     writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
     writer.writeheader()
@@ -119,7 +119,7 @@ def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
 
 
 def _bar_rows(comparison: Comparison, bar: ErrorBar) -> list[dict[str, Any]]:
-    """One row for each frame; ``model``: the change of the statistic by another model of springs."""
+    """One row for each frame; ``model``: the change of the statistic with another model of springs."""
     columns = {"of": bar.of, "metric": bar.metric, "statistic": bar.statistic, "unit": bar.unit}
     model = [None] * len(bar.values) if bar.model is None else [finite(value) for value in bar.model]
     return [

@@ -80,7 +80,7 @@ def ratio_of(band: Band) -> float | None:
 
 
 def beside(found: Uncertainty, candidate: str) -> dict[str, Placed]:
-    """The places of a candidate by quantity."""
+    """The comparisons of a candidate with the bands, by quantity."""
     return {one.quantity: one for one in found.placed if one.candidate == candidate}
 
 

@@ -61,7 +61,7 @@ def _cells(one: Result) -> tuple[str, ...]:
 
 
 def facts(verification: Verification) -> dict[str, Any]:
-    """All of it as valid JSON: a number that is not finite is None."""
+    """The contents of the page as valid JSON: a number that is not finite is None."""
     return {
         "verdict": verification.word,
         "passed": sum(one not in verification.failed for one in verification.judged),
@@ -163,12 +163,12 @@ def _style_overview(figure: Figure, axes: Axes, limits: tuple[float, float]) -> 
 
 
 def drawable(one: Result) -> bool:
-    """True with two meshes or more whose errors can be drawn on a logarithmic axis."""
+    """True if the errors of two or more meshes can be drawn on a logarithmic axis."""
     return len(_errors(one)[0]) > 1
 
 
 def convergence(one: Result) -> Drawing:
-    """Error over mesh size on logarithmic axes, with a line whose slope is the integer nearest to the measured order."""
+    """Error against mesh size on logarithmic axes, with a line whose slope is the integer nearest to the measured order."""
     sizes, errors = _errors(one)
     order = one.finding.order
 

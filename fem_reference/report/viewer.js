@@ -1,7 +1,7 @@
 // The 3D view of the page: unpacks the frames that viewer.py packed and draws every run with the same camera.
 const data = JSON.parse(document.getElementById("viewer-data").textContent);
 const part = (name) => document.getElementById(`viewer-${name}`);
-const FIELD = 18; // degrees the camera sees from top to bottom: little, so that nothing is far from parallel
+const FIELD = 18; // vertical field of view [degrees], small, so that the projection is nearly parallel
 const PLAY_RATE = 8; // frames a second
 const KEY_TURN = Math.PI / 24, KEY_MOVE = 20, KEY_ZOOM = 0.9;
 const MUSCLE = "#b4574e", BONE = "#dedbd4", UNKNOWN = "#85878d", SEEN_THROUGH = 0.28;
@@ -15,7 +15,7 @@ async function unpacked(text) {
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
 }
 
-// The library's files name each other; here they are known by the addresses of the page's own memory.
+// The library's files import each other by name; here each name becomes the address of a blob in the page's memory.
 async function library(files) {
   const source = async (name) => new TextDecoder().decode(await unpacked(files[name]));
   const address = (text) => URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
@@ -39,11 +39,11 @@ async function wholeNumbers(text, frames) {
 }
 
 function sorry(error) {
-  part("sorry").textContent = `No 3D view (${error.message}). It needs WebGL 2; the pictures below show the same without.`;
+  part("sorry").textContent = `No 3D view (${error.message}). It needs WebGL 2; the pictures below show the same without it.`;
   return null;
 }
 
-// ---- What is drawn
+// ---- The scene
 
 async function assembled() {
   const renderer = new three.WebGLRenderer({ canvas: part("canvas"), antialias: true });
@@ -62,7 +62,7 @@ async function assembled() {
   ghost.renderOrder = 1;
   scene.add(...runs.flatMap((run) => [run.mesh, run.strands.mesh, run.arrows, ...run.marks.all]), ...bones.map((each) => each.mesh), ghost);
   const controls = new three.OrbitControls(camera, renderer.domElement);
-  controls.enableZoom = false; // until the picture has the focus: else nobody could scroll past it
+  controls.enableZoom = false; // until the picture has the focus; otherwise nobody could scroll past it
   renderer.domElement.style.touchAction = "pan-y";
   return { renderer, scene, camera, controls, runs, bones, ghost, frame: 0, top: data.quantities[0]?.top ?? 0, radius: reach(runs, bones), drawing: 0, playing: 0 };
 }
@@ -77,7 +77,7 @@ async function muscle(run, faces) {
   const geometry = new three.BufferGeometry();
   geometry.setIndex(faces);
   for (const name of ["position", "color"]) geometry.setAttribute(name, new three.BufferAttribute(new Float32Array(stride), 3));
-  const behind = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 }; // its marks
+  const behind = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 }; // the surface lies behind its marks
   const mesh = new three.Mesh(geometry, look(MUSCLE, behind));
   mesh.frustumCulled = false;
   const packed = await Promise.all(Object.entries(run.levels).map(async ([name, text]) => [name, await levels(text)]));
@@ -106,7 +106,7 @@ function label(name) {
   return element;
 }
 
-// How far [mm] anything is from the middle of the picture in any frame: the camera sees as far and as near.
+// The greatest distance [mm] of anything from the middle of the picture in any frame, for the camera's near and far planes.
 function reach(runs, bones) {
   const middle = new three.Vector3(...data.camera.middle);
   const far = bones.flatMap(({ mesh, poses }) => poses.map((pose) => {
@@ -170,7 +170,7 @@ function describe(run, chosen) {
   const known = run.reached[frame] && runs[0].reached[frame];
   label.className = run.reached[frame] && !off ? "" : "bad";
   label.textContent = shades(run, chosen) ? `${WORDS[chosen.name]} ${off ? "more than " : ""}${number(run.greatest)} mm` : "";
-  if (off) label.textContent += `; ${off} vertices are farther off than is drawn`;
+  if (off) label.textContent += `; ${off} vertices are too far away to be drawn`;
   if (!known && chosen?.name !== "depth") label.textContent = run.reached[frame] ? "no frame of the reference" : "no frame";
   if (!run.reached[frame]) label.textContent = "no frame";
   const drawn = run.mesh.geometry.attributes.position.array;
@@ -180,20 +180,20 @@ function describe(run, chosen) {
 
 // ---- The picture
 
-// Panes in rows of at most three where they all fit into one, else in a square.
+// Up to three panes in one row, more in a square grid.
 function arrange() {
   const shown = panes(), columns = shown.length <= 3 ? shown.length : Math.ceil(Math.sqrt(shown.length));
   const rows = Math.ceil(shown.length / columns), width = part("stage").clientWidth;
   const height = Math.min(width / columns, (0.8 * window.innerHeight) / rows);
   view.layout = shown.map((run, i) => ({ run, left: (i % columns) * (width / columns), top: Math.floor(i / columns) * height }));
   Object.assign(view, { width: width / columns, height, rows });
-  view.controls.panSpeed = view.controls.rotateSpeed = rows; // they reckon with the height of the whole canvas
+  view.controls.panSpeed = view.controls.rotateSpeed = rows; // they use the height of the whole canvas
   view.renderer.setSize(width, rows * height, false);
   part("canvas").style.height = `${rows * height}px`;
   view.runs.forEach((run) => { run.label.hidden = true; });
   view.layout.forEach(({ run, left, top }) => {
     run.label.hidden = false;
-    const share = { left: left / width, top: top / (rows * height), width: 1 / columns, height: 1 / rows }; // on paper the picture has another size
+    const share = { left: left / width, top: top / (rows * height), width: 1 / columns, height: 1 / rows }; // a printed picture has another size
     Object.entries(share).forEach(([name, value]) => { run.label.style[name] = `${100 * value}%`; });
   });
   show(view.frame);
@@ -206,7 +206,7 @@ function draw() {
   });
 }
 
-// On the paper that the page has, dark or not.
+// Draw the panes now, for a dark page if ``night`` is true.
 function drawNow(night) {
   const { camera, controls, radius, width, height, renderer, ghost } = view, away = controls.getDistance();
   const aside = controls.target.distanceTo(new three.Vector3(...data.camera.middle));
@@ -223,7 +223,7 @@ function style(name, otherwise) {
   return getComputedStyle(part("stage")).getPropertyValue(name).trim() || otherwise;
 }
 
-// What is on paper is a picture of it: a browser keeps no canvas for the printer.
+// Replace the canvas by a picture for printing, as browsers do not keep the canvas for the printer.
 function print() {
   drawNow(false);
   part("print").src = part("canvas").toDataURL();
@@ -240,7 +240,7 @@ function pane({ run, left, top }) {
   });
   view.bones.forEach(({ mesh, plate }) => {
     mesh.visible = isOn("bones");
-    const within = plate || quantity()?.name === "depth"; // what is in a bone is seen through it, and what is behind a plate
+    const within = plate || quantity()?.name === "depth"; // bones are transparent if penetration is shown, and plates always
     Object.assign(mesh.material, { transparent: within, opacity: within ? SEEN_THROUGH : 1, depthWrite: !within });
   });
   ghost.visible = isOn("laid") && compared;
@@ -259,7 +259,7 @@ function lookFrom(direction) {
   draw();
 }
 
-// ---- What people do
+// ---- Input
 
 function listen() {
   document.getElementById("viewer").hidden = false;
@@ -293,7 +293,7 @@ function listen() {
   follow();
 }
 
-// The frame at which one of the runs is furthest from the reference.
+// The frame in which one of the runs is furthest from the reference.
 function worst(runs) {
   return runs.reduce((one, other) => (other.worst[0] > one.worst[0] ? other : one), view.runs[0]).worst[1];
 }

@@ -38,7 +38,7 @@ from fem_reference.report.viewer_fields import NEAR, Fields, arrows, joints
 from fem_reference.runs.store import Run, at_numbers
 
 THREE = Path(__file__).parent / "three"
-# The most bytes of positions and levels of all frames before compression; compression and base64 together hardly change the size.
+# Greatest number of bytes of all positions and levels before compression; compression and base64 together hardly change it.
 BUDGET = 10_400_000
 BONE_TRIANGLES = 8000
 _LEVELS = 65535
@@ -157,7 +157,7 @@ def _frames(run: Run, numbers: tuple[int, ...]) -> Floats:
 
 
 def _box(reference: Floats, runs: list[Floats]) -> _Box:
-    """The box around all frames, as a run may scatter at most one length larger on each side than the box of the reference."""
+    """The box around all frames, but at most one diagonal larger on each side than that of the reference, as a run may scatter."""
     low, high = _bounds(reference)
     reach = float(np.linalg.norm(high - low))
     lows, highs = zip(*(_bounds(frames) for frames in [reference, *runs] if np.isfinite(frames).any()), strict=True)
@@ -195,7 +195,7 @@ def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> tuple[list[di
 
 
 def _last_finite(frames: Floats) -> Floats:
-    """The frames; a frame that was not reached is replaced by the last reached frame before it, so that it takes no bytes."""
+    """The frames; a frame that was not reached is replaced by the last reached frame before it, so that it adds few bytes."""
     reached = np.isfinite(frames).all(axis=(1, 2))
     last = np.maximum.accumulate(np.where(reached, np.arange(len(frames)), 0))
     return np.asarray(frames[last])

@@ -105,7 +105,7 @@ class Fields:
         ]
 
     def levels(self, run: Run) -> dict[str, bytes]:
-        """The bytes of a run by quantity; 0 if it is not known."""
+        """The bytes of a run by quantity; 0 where the value is not known."""
         found = {}
         for name, values in self.surfaces.items():
             if run.name in values:

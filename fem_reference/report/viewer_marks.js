@@ -1,4 +1,4 @@
-// What acts on a muscle: the vertices that are attached to bones, and those that bones press. Part of viewer.js.
+// Marks of a muscle: vertices that are attached to bones, and vertices that touch bones. Part of viewer.js.
 const ATTACHED = "#e0218a", TOUCHED = "#101014", PLATE = 36; // corners of the twelve triangles of a box
 
 async function marks(run, geometry) {

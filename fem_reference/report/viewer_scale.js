@@ -1,4 +1,4 @@
-// Colours, scale and histogram of what the 3D view shows: part of viewer.js.
+// Colours, scale and histogram of the quantities in the 3D view. Part of viewer.js.
 const FORCE = "#1f6fd1", LONGEST = 0.6; // of half the picture's height
 const BINS = 48, GREATEST_LEVEL = 127;
 const WORDS = { distance: "worst vertex", surface: "farthest from the surface", depth: "deepest in a bone" };
@@ -28,7 +28,7 @@ function values(run, { name, top }) {
   return found;
 }
 
-// The error bar [mm] of the distance to the reference, below which a distance says nothing.
+// The error bar [mm] of the distance to the reference, below which a distance is not significant.
 function unknown({ name }) {
   return data.bars[name]?.[view.frame] ?? 0;
 }
@@ -62,7 +62,7 @@ function number(value) {
   return size >= 1000 ? value.toFixed(0) : String(Number(value.toPrecision(3))).replace("-", "\u2212");
 }
 
-// The scale of the surfaces: its colours, with what is not known in grey, its ends, and how many vertices have which.
+// The colour scale of the surfaces: its colours, with unknown values in grey, its ends, and the histogram of the vertices.
 function legend() {
   const chosen = quantity(), shown = panes().filter((run) => shades(run, chosen));
   part("legend").hidden = !chosen;
@@ -93,7 +93,7 @@ function scale(top) {
   show(view.frame);
 }
 
-// The scale begins anew with each quantity.
+// The scale is reset for each quantity.
 function choose() {
   const chosen = quantity();
   view.top = chosen?.top ?? view.top;
@@ -140,7 +140,7 @@ function fibreLegend() {
 
 // ---- Forces
 
-// As many arrows as a frame has at most, in front of everything, along y until they are turned.
+// As many arrows as any frame has, drawn in front of everything, along y until they are turned.
 function arrows(run) {
   const group = new three.Group(), thick = 0.012 * data.camera.half;
   for (let i = Math.max(0, ...run.forces.map((frame) => frame.length)); i > 0; i--) {

@@ -8,7 +8,7 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float | None) -> str:
-    """A number with three significant digits; whole numbers from 1000 on in full.
+    """A number with three significant digits; from 1000 to 10^7, a rounded integer.
 
     >>> number(0.12345), number(12.3456), number(0), number(float("nan"))
     ('0.123', '12.3', '0', 'not a number')
@@ -79,7 +79,7 @@ def words(name: str) -> str:
 
 
 def listed(names: list[str]) -> str:
-    """Names in a sentence.
+    """Names joined for a sentence.
 
     >>> listed(["pbd"]), listed(["pbd", "arap", "ours"])
     ('pbd', 'pbd, arap and ours')

@@ -1,1 +1,1 @@
-"""Studies of many solutions: error bars, rankings of solvers, convergence."""
+"""Studies of many solutions: error bars, rankings of solvers, and convergence."""

@@ -15,32 +15,32 @@ from fem_reference.scenes.muscles import MusclesCase
 
 
 def check[T](given: object, kind: type[T], place: str, want: str) -> T:
-    """The ``given`` argument; InputError unless it is of a ``kind``."""
+    """The ``given`` argument; InputError unless it is an instance of ``kind``."""
     if not isinstance(given, kind):
         raise InputError(place, said(given), want)
     return given
 
 
 def check_case(case: object) -> Case:
-    """The case; InputError unless it is one."""
+    """The ``case``; InputError unless it is a Case."""
     return check(case, Case, "case", "a Case, such as load_case returns")
 
 
 def is_of_body(reference: object, of: object) -> bool:
-    """True for a run of a body; InputError where it is of another body than ``of``."""
+    """True for a run of the body ``of``; InputError for a run of another body."""
     if not isinstance(reference, Run) or reference.body is None:
         return False
     if reference.body is not of:
-        raise InputError("reference", "a solution of another body", "what solve_body returned for this one")
+        raise InputError("reference", "a solution of another body", "what solve_body returned for this body")
     return True
 
 
 def check_muscle(name: object, case: object) -> None:
-    """Raise InputError unless ``name`` is that of one of several muscles of the ``case``, or empty for any other case or body."""
+    """Raise InputError unless ``name`` is one of several muscles of the ``case``, or empty for any other case or a body."""
     names = [one.name for one in case.muscle] if isinstance(case, MusclesCase) else []
     if name not in (names or [""]):
         raise InputError(
-            "muscle", said(name), f"one of {', '.join(names)}" if names else "none, as there are not several"
+            "muscle", said(name), f"one of {', '.join(names)}" if names else "none, without several muscles"
         )
 
 
@@ -77,7 +77,7 @@ def free_folder(given: object, place: str) -> Path:
 
 
 def check_comparison(comparison: object) -> Comparison:
-    """The comparison; InputError unless it is one."""
+    """The ``comparison``; InputError unless it is a Comparison."""
     return check(comparison, Comparison, "comparison", "a Comparison, such as compare returns")
 
 
@@ -87,12 +87,12 @@ def check_error_bars(bars: object, case: Case) -> None:
         return
     known = check(bars, ErrorBars, "error_bars", "ErrorBars, such as error_bars returns, or None")
     if known.numbers != case.numbers:
-        want = f"those of frames {case.numbers}, of the case"
-        raise InputError("error_bars", f"those of frames {known.numbers}", want)
+        want = f"bars of frames {case.numbers}, those of the case"
+        raise InputError("error_bars", f"bars of frames {known.numbers}", want)
 
 
 def check_run(given: object, case: Case, place: str) -> None:
-    """Raise InputError unless ``given`` is a run, and one of the ``case`` if it names a case at all."""
+    """Raise InputError unless ``given`` is a run and, if it names a case, a run of the ``case``."""
     run = check(given, Run, place, "a Run, such as solve and read_run return")
     scene, effects, place = run.origin.get("scene"), run.origin.get("effects"), f'{place} "{run.name}"'
     keys = {case.key}
@@ -101,14 +101,14 @@ def check_run(given: object, case: Case, place: str) -> None:
         keys.add(case.model_copy(update={"effect": acting}).key)
     if scene is not None and scene not in keys:
         got = f'a run of another case ("{run.origin.get("case", "without a name")}")'
-        raise InputError(place, got, f'one of "{case.name}" with all its keys as they are')
+        raise InputError(place, got, f'a run of "{case.name}" with all its keys unchanged')
     if run.carries.isdisjoint(case.carries):
         got, want = (", ".join(sorted(parts)) for parts in (run.carries, case.carries))
-        raise InputError(place, f"a run of {got}", f"one of {want}")
+        raise InputError(place, f"a run of {got}", f"a run of {want}")
 
 
 def check_runs(reference: Run, candidates: object, case: Case) -> None:
-    """Raise InputError where runs cannot be compared: they are of another case, two have the same name, or the vertices differ."""
+    """Raise InputError if runs cannot be compared: they are of another case, two have the same name, or the vertices differ."""
     check_run(reference, case, "reference")
     if not isinstance(candidates, Sequence) or isinstance(candidates, str | bytes):
         raise InputError("candidates", said(candidates), "a list of runs")
@@ -122,4 +122,4 @@ def check_runs(reference: Run, candidates: object, case: Case) -> None:
             got, want = (f"{one.positions.shape[1]} vertices" for one in (run, reference))
             raise InputError(f'candidate "{run.name}"', got, f"the {want} of the reference: a run of the same case")
         if np.shape(run.points) != np.shape(reference.points):
-            raise InputError(f'candidate "{run.name}"', f"{len(run.points)} points", f"{len(reference.points)} of them")
+            raise InputError(f'candidate "{run.name}"', f"{len(run.points)} points", f"{len(reference.points)} points")

@@ -1,4 +1,4 @@
-"""Several muscles solved together by one reference: a comparison for each, with candidates that solve it alone."""
+"""Comparisons of several muscles that one reference solves together, with candidates that solve each muscle alone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from fem_reference.scenes.case import Candidate, Case
 from fem_reference.studies import judging, muscle_bars
 from fem_reference.studies.execution import Bench
 
-# A remark that pages of several muscles make on candidates.
+# A remark on candidates, for pages of several muscles.
 ALONE = "Each candidate solves each muscle by itself, without the other muscles."
 
 
@@ -38,8 +38,8 @@ class ByMuscle:
 
 def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, error_bars: bool = False) -> ByMuscle:
     """A comparison for each muscle of a case with several: its part of the common reference, and candidates that solve it alone.
-    Recorded frames are read from folders named after the muscles; a candidate may lack some. With ``error_bars``, these are
-    made; else stored ones are used.
+    Recorded frames are read from folders named after the muscles; a candidate may lack some. With ``error_bars``, bars are
+    computed; else stored ones are used.
     """
     parts, found = bench.parts, dict[str, Comparison]()
     chosen = [(bench.found(*one), one[1]) for one in chosen]
@@ -69,7 +69,7 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, err
 
 
 def _own(chosen: tuple[Candidate, str], name: str) -> tuple[Candidate, str] | None:
-    """A candidate with its place; for recorded frames with the folder of the muscle ``name``, or None where that does not exist."""
+    """A candidate with its place; for recorded frames with the folder of the muscle ``name``, or None if it does not exist."""
     entry, place = chosen
     if entry.solver != "recorded":
         return chosen

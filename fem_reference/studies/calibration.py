@@ -1,4 +1,4 @@
-"""Fits the parameters of a case to measured forces, lengths and places, by runs of its reference."""
+"""Calibration: fit of the parameters of a case to measured forces, lengths and positions, by runs of its reference."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -32,12 +32,12 @@ _WANT = "METRIC.STATISTIC, force.BONE, force.BONE.x, or position.VERTEX.x"
 def calibrate_case(
     case: Case, data: str | Path, fit: Sequence[str], *, store: str | Path = STORE, progress: Progress | None = None
 ) -> Calibration:
-    """Fit numbers of the case of a muscle to measurements, by runs of its reference at the size that the case has.
+    """Fit numbers of the case of a muscle to measurements, by runs of its reference on the mesh of the case.
 
     ``data``: a CSV file with the columns ``frame,quantity,value,unit,sd``, as the page on unknown parameters describes them;
     ``fit``: keys of numbers that have a range, such as ``"effect[0].mu"``. The result has ``estimates``, each with its
     ``parameter``, ``value`` and confidence interval from ``low`` to ``high`` in the unit of the parameter, and ``holds``: True
-    where the fit converged, the law fits the data, and all numbers are determined.
+    if the fit converged, the law fits the data, and all numbers are determined.
     """
     muscle = casefile.muscle(arguments.check_case(case))
     keys, folder = arguments.check_keys(fit), arguments.free_folder(store, "store")
@@ -67,7 +67,7 @@ def calibrate(case: MuscleCase, data: Path, keys: Sequence[str], store: Path, wo
 
 
 def chosen(varied: Unknowns, keys: Sequence[str]) -> tuple[Parameter, ...]:
-    """The parameters at ``keys``; InputError where one has no range, or belongs to an effect that the case leaves out."""
+    """The parameters at ``keys``; InputError if one has no range, or belongs to an effect that the case leaves out."""
     known = {one.key: one for one in varied.parameters()}
     for key in keys:
         numbers.number(varied.whole, key)
@@ -83,7 +83,7 @@ def chosen(varied: Unknowns, keys: Sequence[str]) -> tuple[Parameter, ...]:
 
 
 def unit_of(case: MuscleCase, quantity: str, place: str) -> str:
-    """The unit of a quantity of the case; InputError at ``place`` where the case has no such quantity."""
+    """The unit of a quantity of the case; InputError at ``place`` if the case has no such quantity."""
     kind, name, axis = _split(quantity)
     bones = [bone.name for bone in case.bone]
     if kind == "force":
@@ -100,7 +100,7 @@ def unit_of(case: MuscleCase, quantity: str, place: str) -> str:
 
 
 def _split(quantity: str) -> tuple[str, str, str]:
-    """The kind of a quantity, its name, and its axis, empty where it has none.
+    """The kind of a quantity, its name, and its axis, empty if it has none.
 
     >>> _split("force.femur.x"), _split("force.femur"), _split("fibre_length.mean")
     (('force', 'femur', 'x'), ('force', 'femur', ''), ('fibre_length', 'mean', ''))
@@ -111,7 +111,7 @@ def _split(quantity: str) -> tuple[str, str, str]:
 
 
 def _made(varied: Unknowns, values: Sequence[dict[str, float]], store: Path, workers: Workers) -> list[Run | Failure]:
-    """The runs of the case with other ``values`` by key; a ``Failure`` for one that has no answer."""
+    """The runs of the case with other ``values`` by key; a ``Failure`` for each without an answer."""
     found, trials = dict[int, Run | Failure](), dict[int, Trial]()
     for i, one in enumerate(values):
         said = ", ".join(f"{key} {value:.6g}" for key, value in one.items())
@@ -132,7 +132,7 @@ def _values(case: MuscleCase, run: Run, rows: Sequence[Measurement], store: Path
 
 
 def _value(run: Run, row: Measurement, changes: Sequence[Measure]) -> float:
-    """The value of a ``run`` at the frame of a ``row``, a statistic among its ``changes`` from rest."""
+    """The value of a ``run`` at the frame of a ``row``; a statistic is taken from its ``changes`` from rest."""
     kind, name, axis = _split(row.quantity)
     i = run.numbers.index(row.frame)
     if kind == "force":
@@ -140,7 +140,7 @@ def _value(run: Run, row: Measurement, changes: Sequence[Measure]) -> float:
         return float(force[_AXES.index(axis)] if axis else np.linalg.norm(force))
     if kind == "position":
         if int(name) >= len(run.surface.points):
-            want = f"one of the {len(run.surface.points)} of the surface"
+            want = f"one of the {len(run.surface.points)} vertices of the surface"
             raise InputError(f"{row.place}: quantity", f"vertex {name}", want)
         return float(run.positions[i, int(name), _AXES.index(axis)])
     measure = find(changes, kind, name)

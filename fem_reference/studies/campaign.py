@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 
 # The number of attempts at a run whose worker died.
 ATTEMPTS = 3
-# A run that ended with one of these statuses would do so again; one that timed out or crashed may succeed.
+# A run that ended with one of these statuses would do so again; a run that timed out or crashed may succeed.
 _LASTING = ("diverged", "inverted", "collapsed", "limit point", "out of steps")
 _BENCHES: dict[tuple[str, Path, Path], Bench[MuscleCase]] = {}
 
@@ -34,7 +34,7 @@ _BENCHES: dict[tuple[str, Path, Path], Bench[MuscleCase]] = {}
 @dataclass(frozen=True)
 class Workers:
     """Workers that solve runs: ``count`` processes of this machine, or the workers of the Dask scheduler at ``address``, such as
-    one that dask-jobqueue started on a cluster; all need access to the store. InputError where ``count`` is below one.
+    one that dask-jobqueue started on a cluster; all need access to the store. InputError if ``count`` is below one.
     """
 
     count: int = 1
@@ -53,7 +53,7 @@ class Workers:
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """A trial with its ``run``, or the reason ``failure`` why there is none."""
+    """A trial with its ``run``, or the reason (``failure``) why there is none."""
 
     trial: Trial
     run: Run | None
@@ -61,17 +61,17 @@ class Made:
 
     @property
     def reached(self) -> Run | None:
-        """The run, None where it did not reach all frames."""
+        """The run, None if it did not reach all frames."""
         return self.run if self.ended[0] == "converged" else None
 
     @property
     def ended(self) -> tuple[str, str]:
-        """Status and message of the run, the status ``"refused"`` where there is none."""
+        """Status and message of the run, the status ``"refused"`` if there is none."""
         return (self.run.outcome.status, self.run.outcome.message) if self.run else ("refused", self.failure)
 
 
 def each[S, T](scenes: Mapping[str, S], of: Callable[[S], T]) -> tuple[dict[str, T], dict[str, str]]:
-    """The results of the function ``of`` for the scenes by name, and by name the InputError of each scene without one."""
+    """The results of the function ``of`` by name of the scene, and the InputError of each scene without a result."""
     found, missing = dict[str, T](), dict[str, str]()
     for name, scene in scenes.items():
         try:
@@ -83,7 +83,7 @@ def each[S, T](scenes: Mapping[str, S], of: Callable[[S], T]) -> tuple[dict[str,
 
 
 def carry_out(trials: Sequence[Trial], store: Path, workers: Workers) -> tuple[Made, ...]:
-    """The runs of all ``trials``, in their order, from the ``store`` where they are, else solved now."""
+    """The runs of all ``trials``, in their order, from the ``store`` if they are there, else solved now."""
     if workers.count > 1 or workers.address is not None:
         return _in_parallel(trials, store.absolute(), workers)
     made = []
@@ -111,7 +111,7 @@ def solve(trial: Trial, store: Path) -> Run:
 
 
 def shared_bench(case: MuscleCase, store: Path) -> Bench[MuscleCase]:
-    """The bench that runs on a case share in this process, and with it their tetrahedra; the process keeps two benches."""
+    """The bench that all runs on a case share in this process, with its tetrahedra; the process keeps two benches."""
     key = case.key, store, case.folder
     if key not in _BENCHES:
         for old in list(_BENCHES)[:-1]:
@@ -133,7 +133,7 @@ def _in_parallel(trials: Sequence[Trial], store: Path, workers: Workers) -> tupl
     for attempt in range(ATTEMPTS):
         wanted = [i for i in range(count) if i not in made]
         if wanted and attempt:
-            log.info("a worker ended before its time; %d runs are tried again", len(wanted))
+            log.info("a worker died; %d runs are tried again", len(wanted))
         try:
             with _executor(workers) as executor:
                 futures = {executor.submit(_by_worker, trials[i], store): i for i in wanted}
@@ -148,7 +148,7 @@ def _in_parallel(trials: Sequence[Trial], store: Path, workers: Workers) -> tupl
         except BrokenProcessPool:
             continue
         break
-    lost = f"its worker ended before its time, {ATTEMPTS} times"
+    lost = f"its worker died {ATTEMPTS} times"
     return tuple(made.get(i, Made(trial, None, lost)) for i, trial in enumerate(trials))
 
 
@@ -164,7 +164,7 @@ def _loaded(folder: Path, trial: Trial) -> Run:
 
 @contextmanager
 def _executor(workers: Workers) -> Iterator[Executor]:
-    """Processes of this machine, or the workers of a Dask scheduler, which hands the run of a worker that died to another one."""
+    """Processes of this machine, or the workers of a Dask scheduler, which gives the run of a dead worker to another worker."""
     if workers.address is None:
         # Spawned processes, as numba, PETSc and locks do not survive a fork.
         before = set(multiprocessing.active_children())

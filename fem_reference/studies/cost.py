@@ -1,4 +1,4 @@
-"""Accuracy against time on a case: its reference and candidates over ladders of settings, each run measured against the truth."""
+"""Accuracy against time on a case: runs of its reference and candidates with varied settings, each compared with the truth."""
 
 import logging
 import math
@@ -28,7 +28,7 @@ from fem_reference.studies.variations import TETRAHEDRA, Trial, candidate_trials
 
 log = logging.getLogger(__name__)
 
-# The metrics of every point of the study; the joint moment only where a solver has forces.
+# The metrics of every point of the study; the joint moment only if a solver has forces.
 METRICS = (*in_tables(), "joint_moment")
 # Surface solvers also run on 4**power times as many triangles; these surfaces are stored beside the runs.
 _POWERS = (-1, 1)
@@ -40,14 +40,14 @@ _CLAIMING = 4
 
 
 def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Collection[str] = ()) -> Study:
-    """Study each of ``scenes`` with runs in ``store``, solved where missing; with ``only`` these solvers, if any are named."""
+    """Study each of ``scenes`` with runs in ``store``, solved if missing; if ``only`` names solvers, with these alone."""
     cases, missing = each({scene.name: scene for scene in scenes}, lambda case: _of(case, store, workers, only))
     return Study(tuple(cases.values()), missing, made_with(str(workers)))
 
 
 def stored(folder: Path) -> list[CaseStudy]:
-    """The studies below ``folder``, one for each case: preferably the one in the folder named after the case, joined by the points
-    of other studies against the same truth, such as those of a user's own solver; InputError where there is none.
+    """The studies below ``folder``, one for each case: preferably the one in the folder named after the case, with the points
+    of other studies against the same truth added, such as those of a user's own solver; InputError if there is none.
     """
     known = [(study, path.parent.name) for path in sorted(folder.glob(f"*/{FILE}")) for study in load(path)]
     found = dict[str, CaseStudy]()
@@ -73,7 +73,7 @@ def _of(case: MuscleCase, store: Path, workers: Workers, only: Collection[str]) 
     log.info("%s: the truth", case.name)
     truth = bench.reference()
     if truth.outcome.status != "converged" or truth.fibres is None:
-        raise InputError(case.place, f"a reference that {truth.outcome.status}", "one that reaches all frames")
+        raise InputError(case.place, f"a reference with status {truth.outcome.status}", "one that reaches all frames")
     bars = refinement.bars(bench, truth, model=False)
     context, own = context_of(bench.setup(), truth), case.reference.solver
     triangles = len(truth.surface.triangles)
@@ -107,7 +107,7 @@ def _of(case: MuscleCase, store: Path, workers: Workers, only: Collection[str]) 
 
 
 def known(bars: ErrorBars | None) -> dict[str, float]:
-    """The error bar of each statistic of a deviation, the greatest over the frames."""
+    """The greatest error bar over the frames, for each statistic of a deviation."""
     if bars is None:
         return {}
     worst = {f"{bar.metric}.{bar.statistic}": bar.worst.value for bar in bars.of_deviations}
@@ -137,7 +137,7 @@ def settings_of(trial: Trial) -> dict[str, object]:
 
 
 def greatest(run: Run, truth: Run, context: MeasurementContext, names: Collection[str]) -> dict[str, float]:
-    """For each statistic of the metrics ``names``, the greatest magnitude of its deviation over frames; NaN where any is NaN."""
+    """For each statistic of the metrics ``names``, the greatest magnitude of its deviation over frames; NaN if any is NaN."""
     found = measure(complete(run, truth.numbers), truth, context, names)
     return {f"{one.metric}.{one.statistic}": float(np.abs(one.values).max()) for one in found}
 
@@ -160,7 +160,7 @@ def costs(run: Run) -> dict[str, float]:
 
 
 def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store: Path) -> tuple[Claim, ...]:
-    """The error bars of the reference on coarser meshes, each beside the difference of that run from the truth."""
+    """The error bars of the reference on coarser meshes, each with the difference of that run from the truth."""
     found = list[Claim]()
     on_tetrahedra = [one for one in made if (one.trial.name, one.trial.knob) == ("reference", TETRAHEDRA)]
     members = [(one.trial, run) for one in on_tetrahedra if (run := one.reached) is not None]

@@ -1,4 +1,4 @@
-"""Best fits of laws to measured cubes, beside the shipped material, which is not fitted: the limit of what a law can reach."""
+"""Best fits of laws to measured cubes, which show the limit of each law; the shipped material itself is not fitted."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from fem_reference.foundations.mesh import Floats
 
 Parameters = Mapping[str, tuple[float, tuple[float, float] | None]]
 _STEP = 1e-4  # the step of a parameter's logarithm, far above the error of root finding, 1e-8
-_MOST = 100  # the most evaluations of a fit; these fits converge within 30
+_MOST = 100  # the greatest number of evaluations of a fit; these fits converge within 30
 _SHEAR = SHIPPED[0].parameters[0][1]
 
 
@@ -42,7 +42,7 @@ def shipped_law() -> Fitted:
 
 def collagen_law(most: int = _MOST) -> Fitted:
     """The law with collagen across the fibres, fitted to all quantities except orders, which have no slope, in at most ``most``
-    evaluations. Only the fibres have a published range: no publication known here has ``k1`` and ``k2`` of this law.
+    evaluations. Only the fibres have a published range: we know no publication with ``k1`` and ``k2`` of this law.
     """
     to = [one for one in QUANTITIES if not one.is_order]
     ended = _fitted(lambda values: with_collagen(*values), to, (FIBRES["stress"] / 2, 0.1, 10.0), most)

@@ -1,9 +1,9 @@
-"""A data set to learn from: muscles solved, checked and measured, with hashes, splits and metadata, in one folder.
+"""Data set for machine learning: muscles solved, checked and measured, with hashes, splits and metadata, in one folder.
 
 dataset.json               version, splits, the SHA-256 of every other file, scenes left out with the reason
 datacite.json              metadata in DataCite's schema 4.6
-load.py                    a loader: numpy alone
-scenes/NAME/case.toml      the case, as ``fem-reference run scenes/NAME`` solves it, and muscle.ply; none of shipped cases
+load.py                    a loader that needs numpy alone
+scenes/NAME/case.toml      the case, as ``fem-reference run scenes/NAME`` solves it, and muscle.ply; neither for shipped cases
            /frames.npz     the arrays of :func:`arrays`
            /bars.json      error bars of every statistic by frame; doubts, such as a small det F at the rim of an attachment
 """
@@ -62,28 +62,28 @@ class Sizes:
 
     @property
     def facts(self) -> dict[str, object]:
-        """Its identity, by which a build recognises the data set in a folder."""
+        """The identity of the data set, by which a build recognises it in a folder."""
         drawn = {"muscles": self.muscles, "poses": self.poses, "seed": self.seed, "shipped": list(self.shipped)}
         return {"version": VERSION, **drawn}
 
 
 def build(folder: Path, wanted: Sizes, store: Path, workers: Workers) -> dict[str, object]:
     """Make the data set in a ``folder``, with runs in ``store``, and return its index. An interrupted build continues from the
-    stored runs. InputError where the folder has another data set or other files, or no scene passes.
+    stored runs. InputError if the folder has another data set or other files, or no scene passes.
     """
     place = folder / INDEX
     if place.exists() and (known := texts.read_json(place, "the index of a data set"))["wanted"] != wanted.facts:
         raise InputError(place, f"the data set {known['wanted']}", f"another folder for {wanted.facts}")
     if folder.exists() and any(folder.iterdir()) and not (folder / "scenes").is_dir():
-        raise InputError(folder, "a folder with other files", "a new one, or that of a data set")
+        raise InputError(folder, "a folder with other files", "a new folder, or that of a data set")
     names = [*wanted.shipped, *(f"muscle_{i:04d}" for i in range(wanted.muscles))]
     files.make_folder(folder / "scenes")
     left = spread(partial(_scene, folder.absolute(), wanted, store.absolute()), names, workers)
     reasons = {name: why for name, why in zip(names, left, strict=True) if why}
     kept = [name for name in names if name not in reasons]
     if not kept:
-        raise InputError(folder, f"no scene that passes: {reasons}", "one at least")
-    # A stopped build of other sizes may have left some.
+        raise InputError(folder, f"no scene that passes: {reasons}", "at least one")
+    # A stopped build of other sizes may have left other scenes.
     for other in {path.name for path in (folder / "scenes").iterdir()} - {*kept}:
         shutil.rmtree(folder / "scenes" / other)
     files.write_text(folder / "load.py", Path(dataset_loader.__file__).read_text(encoding="utf-8"))
@@ -112,7 +112,7 @@ def _scene(folder: Path, wanted: Sizes, store: Path, name: str) -> str:
         if name in wanted.shipped:
             case = casefile.read_muscle(name, {"reference.store_state": True})
             if case.needed_data:
-                raise InputError(name, "anatomy under a licence of its own", "a case of the project's own geometry")
+                raise InputError(name, "anatomy with its own licence", "a case with the project's own geometry")
             files.make_folder(place)
         else:
             case = random_muscles.write(place, wanted.seed, int(name.split("_")[1]), wanted.poses)
@@ -135,7 +135,7 @@ def _scene(folder: Path, wanted: Sizes, store: Path, name: str) -> str:
 
 
 def unfit(bench: Bench[MuscleCase], run: Run, bars: error_bars.ErrorBars | None) -> str:
-    """The reason why a ``run`` is no truth to learn from; empty where it passes all checks."""
+    """The reason why a ``run`` is not a truth to learn from; empty if it passes all checks."""
     case = bench.scene
     checks = run.origin.get(RECORD, {}).get("checks", [])
     if run.outcome.status != "converged" or run.numbers != case.numbers:
@@ -150,15 +150,15 @@ def unfit(bench: Bench[MuscleCase], run: Run, bars: error_bars.ErrorBars | None)
     # A small det F at the singular rim of an attachment does not make a run unfit: the error bars cover it.
     others = {key: values for key, values in run.scalars.items() if not key.startswith("min_det_F")}
     said = [f"{one.expectation.metric} {one.word}" for one in own if one.word != "pass"]
-    return "; ".join([*doubts(replace(run, scalars=others)), *said]) or ("" if own else "nothing is expected of it")
+    return "; ".join([*doubts(replace(run, scalars=others)), *said]) or ("" if own else "it has no expectations")
 
 
 def arrays(bench: Bench[MuscleCase], run: Run) -> Arrays:
     """Arrays of a ``run`` by name: ``frames`` (f,), ``poses`` (f, b, 4, 4) of ``bones`` (b,), ``activation`` (f,); at rest
     ``points`` (n, 3), ``triangles``, ``tet_points`` (k, 3), ``tets``, ``fibre_points`` (m, 3), ``fibre_offsets``, ``fibre`` (t, 3),
     the direction in each tetrahedron; by frame ``positions`` (f, n, 3), ``fibre_positions`` (f, m, 3), ``tet_positions`` (f, k, 3)
-    [mm], ``stress`` (f, t, 3, 3) [MPa], Cauchy's in the middle of each, and ``forces``, ``moments`` (f, b, 3) [N, N mm] on bones,
-    NaN where unknown; ``surface_bar`` (f,) [mm], the error bar of the surface, rms.
+    [mm], Cauchy ``stress`` (f, t, 3, 3) [MPa] in the middle of each, and ``forces``, ``moments`` (f, b, 3) [N, N mm] on bones,
+    NaN if unknown; ``surface_bar`` (f,) [mm], the error bar of the surface, rms.
     """
     assert run.fibres is not None
     assert run.fibre_positions is not None
@@ -204,8 +204,8 @@ def _inside(run: Run, case: MuscleCase) -> Arrays:
 
 
 def splits(found: dict[str, Arrays], seed: int) -> dict[str, dict[str, dict[str, list[int]]]]:
-    """Rows of frames by scene, for training and for testing. By ``pose``: equal poses of a scene are in the same part, rest in that
-    for training. By ``shape``: all scenes of the same shape are in the same part.
+    """Rows of frames by scene, for training and for testing. By ``pose``: equal poses of a scene are in the same part, rest in the
+    part for training. By ``shape``: all scenes of the same shape are in the same part.
     """
     rng, names = np.random.default_rng(seed), list(found)
     parts: dict[str, dict[str, dict[str, list[int]]]] = {key: {"train": {}, "test": {}} for key in ("pose", "shape")}
@@ -223,7 +223,7 @@ def splits(found: dict[str, Arrays], seed: int) -> dict[str, dict[str, dict[str,
 
 
 def _same_poses(one: Arrays) -> Ints:
-    """The group of each frame, 0 for that of the first; frames of a group have equal poses of all bones and equal activation."""
+    """The group of each frame, 0 for the first; frames of a group have equal poses of all bones and equal activation."""
     count = len(one["frames"])
     at = np.concatenate([one["poses"].reshape(count, -1), one["activation"].reshape(count, 1)], axis=1).round(6)
     seen: dict[bytes, int] = {}

@@ -1,7 +1,7 @@
-"""The report's estimation techniques (chapter 3) on the fibres, attachments and surface of a case: error against parameters.
+"""The report's estimation techniques (chapter 3) on the fibres, attachments and surface of a case: errors by parameters.
 
-The decompositions of a muscle into fibres (report 6.1.2) are compared with each other too: direction, length, points outside,
-crossings, and the reference's answer with each.
+The decompositions of a muscle into fibres (report 6.1.2) are also compared with each other: direction, length, points outside,
+crossings, and the reference's answer with each decomposition.
 """
 
 import logging
@@ -46,7 +46,7 @@ CENTRES, GAUSSIANS = (4, 9, 16, 25), (10, 30, 100)
 _ALONG = 1000  # the number of sample points of a curve
 _POLYNOMIAL = 3  # the number of terms of a plane
 LAPLACE = "Laplace field"
-# The statistics of an answer that fibres may change, and the law of fibres for a case without one, which is that of hip_flexion.
+# The statistics of an answer that fibres may change, and the fibre law for a case without one, which is that of hip_flexion.
 ANSWERS = (
     "surface_deviation.rms",
     "surface_deviation.max",
@@ -93,7 +93,7 @@ def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:
 
 
 def _off(line: Floats, count: int, make: Callable[[Floats], Curve]) -> Floats:
-    """Distances (k,) [mm] of points of a ``line`` (n, 3) from the curve by ``make`` through ``count`` others, evenly spread."""
+    """Distances (k,) [mm] of points of a ``line`` (n, 3) from the curve by ``make`` through ``count`` evenly spread others."""
     known = np.rint(np.linspace(0, len(line) - 1, count)).astype(np.int64)
     away, _ = cKDTree(make(line[known])(np.linspace(0, 1, _ALONG))).query(np.delete(line, known, axis=0))
     return np.asarray(away)
@@ -114,8 +114,8 @@ def of_attachments(case: str, setup: Setup) -> Iterator[HeightError]:
 
 
 def _flat(points: Floats) -> Floats:
-    """Points (n, 3) of an area relative to their mean, in its principal axes, the last across it, sorted along the first. They do
-    not depend on the axes of the scene or the order of the points: axes are such that third moments along them are positive.
+    """Points (n, 3) of an area relative to their mean, in its principal axes, the last across it, sorted along the first. The
+    result does not depend on the axes of the scene or the order of the points: third moments along the axes are positive.
     """
     away = points - points.mean(axis=0)
     flat = away @ np.linalg.svd(away, full_matrices=False)[2].T
@@ -168,7 +168,7 @@ def of_decompositions(case: MuscleCase, rest: Setup) -> Iterator[DecompositionEr
 
 
 def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
-    """The reference's answer on a case with each source of fibres, compared with that with the Laplace field and its error bars.
+    """The reference's answer on a case with each source of fibres, beside its answer with the Laplace field and its error bars.
     Fibre lengths are those of the lines of the Laplace field, carried by each surface.
     """
     # Without candidates, which other fibres may not suit.

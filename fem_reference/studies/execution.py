@@ -50,7 +50,7 @@ class Bench[C: Case]:
     def _begin(self) -> None:
         """Reset everything that depends on the effects that act, so that it is made again when needed."""
         self._problem: Callable[[], CaseProblem] = cache(lambda: of_case.problem(self.scene, self._setup()))
-        # The watch for effects that the case left out but that turn out to matter; None where it left out none.
+        # The watch for effects that the case left out but that turn out to matter; None if it left out none.
         self.watch: Callable[[], Watch | None] = cache(lambda: of_case.watch(self.scene, self._setup(), self._problem))
 
     @property
@@ -80,7 +80,7 @@ class Bench[C: Case]:
         return cast("Bench[MuscleCase]", self)
 
     def found[S: SolverChoice](self, choice: S, place: str) -> S:
-        """The ``choice`` with its folder, if any, as a path; a folder that the scene names must be where its files may be."""
+        """The ``choice`` with its folder, if any, as a path; a folder named by the scene must be allowed for the scene's files."""
         folder, named = choice.settings.get("folder"), choice in (self.scene.reference, *self.scene.candidate)
         if not isinstance(folder, str) or not (named or not Path(folder).is_absolute()):
             return choice
@@ -117,8 +117,8 @@ class Bench[C: Case]:
         return {name: replace(one, origin=one.origin | {"scene": parts[name].scene.key}) for name, one in found.items()}
 
     def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
-        """InputError where settings of the reference, of a candidate of the case (except recorded frames, which may come later) or
-        of the ``chosen`` solvers do not suit the case. The problem made from the case is checked only if it has to be solved.
+        """Raise InputError if settings of the reference, of a candidate of the case (except recorded frames, which may come later)
+        or of the ``chosen`` solvers do not suit the case. The problem made from the case is checked only if it has to be solved.
         """
         if self.scene.parts:
             self.settings(self.scene.reference, "reference")
@@ -153,7 +153,7 @@ class Bench[C: Case]:
         return (reference, *(read.get(one.name) or self.obtain(one.name, one, place) for one, place in chosen))
 
     def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:
-        """The stored run that ``obtain`` would reuse; None where it would solve."""
+        """The stored run that ``obtain`` would reuse; None if ``obtain`` would solve."""
         other = Bench(self.scene, self.store, self.ranks)
         other._setup = self._setup
         return other._run(name, choice, place, lambda _: None)
@@ -187,7 +187,7 @@ class Bench[C: Case]:
         if self.scene.parts and wanted.choice.solver != "fenicsx":
             got = f'"{wanted.choice.solver}" for several muscles'
             raise InputError(
-                join(self.scene.place, "solver"), got, "the reference; others solve each muscle by itself, in compare"
+                join(self.scene.place, "solver"), got, "the reference; in compare, others solve each muscle by itself"
             )
         if wanted.choice == self.scene.reference:
             self.check()
@@ -195,7 +195,7 @@ class Bench[C: Case]:
         long = ""
         if wanted.choice.solver == "fenicsx" and given.body is not None:
             long = f", about {expected(given.body, wanted.settings).seconds:.2g} s of processor time"
-        log.info("%s: no stored run of it in %s; solving%s", wanted.name, wanted.folder.parent.resolve(), long)
+        log.info("%s: no stored run in %s; solving%s", wanted.name, wanted.folder.parent.resolve(), long)
         with making.locked(wanted.folder), making.bars_kept(wanted.folder):
             return self._stored(wanted) or self._checked(self._solved(wanted, given))
 
@@ -204,7 +204,7 @@ class Bench[C: Case]:
         return ("converged", "denied", *(("stopped",) if self._watched(solver) else ()))
 
     def _checked(self, run: Run) -> Run:
-        """The ``run``, with its second check, which is stored with it, if a solver that models effects solved a muscle."""
+        """The ``run``, with its second check (stored with it) if a solver that models effects solved a muscle."""
         asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
         if not asked or run.outcome.status not in ("converged", "denied"):
             return run
@@ -248,7 +248,7 @@ class Bench[C: Case]:
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
         """A recorded run, checked against the set-up of the scene; it is read each time and never stored."""
         if self.scene.parts:
-            raise InputError(place, "frames of several muscles", "frames of each, in folders with their names")
+            raise InputError(place, "frames of several muscles", "frames of each muscle, in a folder with its name")
         wanted, frames = self.settings(choice, place), list[Frame]()
         assert isinstance(wanted, recorded.RecordedSettings)
         outcome = solvers.find(choice.solver, place, self.scene.task).solve(self._setup(), wanted, frames.append)
@@ -257,7 +257,7 @@ class Bench[C: Case]:
         return replace(run, name=name, solver=choice.solver, origin=origin, states=())
 
     def folder(self, choice: SolverChoice, place: str) -> Path:
-        """The folder of the stored run of a solver of this package, which exists once the run is made."""
+        """The folder of the stored run of a solver of this package; it exists once the run is made."""
         return self.store / f"{choice.solver}-{self.key(choice.solver, self.settings(choice, place))}"
 
     def key(self, solver: str, settings: Record) -> str:
@@ -266,7 +266,7 @@ class Bench[C: Case]:
         return key(self.scene.key, solver, numerics)
 
     def origin(self, solver: str, settings: Record) -> dict[str, object]:
-        """Provenance of a run, to read and to reproduce it by."""
+        """Provenance of a run, with all that is needed to reproduce it."""
         acting = self.scene.acting if self.scene.task != "solve" or solvers.takes_effects(solver) else {}
         return {
             "case": self.scene.name,

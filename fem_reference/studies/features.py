@@ -43,7 +43,7 @@ def expected(body: Body, settings: Record) -> ExpectedCost:
 def features(case: MuscleCase, setup: Setup) -> dict[str, float]:
     """``size`` [mm], the diagonal of the muscle's box; ``triangles``; ``motion`` [mm], the greatest displacement of an
     attached vertex over the frames; ``contact``, the number of obstacles; ``bulk_to_shear`` and ``fibres_to_shear`` of the
-    material without its regions, 0 where it has none; ``tet_size`` [mm] and ``refinements`` of the reference.
+    material without its regions, 0 if it has none; ``tet_size`` [mm] and ``refinements`` of the reference.
     """
     points = setup.surface.points
     moved = [

@@ -12,11 +12,11 @@ from fem_reference.foundations.records import Record, parse
 from fem_reference.io import texts
 from fem_reference.scenes import casefile
 
-_WANT = "a folder or an archive (zip, tar) with published data, whole"
+_WANT = "an undamaged folder or archive (zip, tar) with published data"
 
 
 class Listed(Record):
-    """Size [bytes] and SHA-256 of files by their path below the data folder: as ``published``, or ``made`` from such files."""
+    """Size [bytes] and SHA-256 of files by their path below the data folder: as ``published``, or ``made`` from published files."""
 
     licence: str
     published: dict[str, tuple[int, str]]
@@ -30,7 +30,7 @@ def known() -> Listed:
 
 def fetch(sources: Sequence[Path], folder: Path, wanted: Listed) -> list[str]:
     """Write each file of ``wanted`` that a source, a folder or an archive, contains into a new ``folder``, and return their paths
-    below it. Names in a source are ignored. InputError, and no folder, if none is found, a source is damaged or ``folder`` in use.
+    below it. Names in a source are ignored. InputError and no folder if none is found, a source is damaged or ``folder`` is in use.
     """
     found, files = set[str](), wanted.published | wanted.made
     sizes = {size for size, _ in files.values()}

@@ -1,4 +1,4 @@
-"""Comparisons of runs of a case of any kind; for a scalar case with the convergence of its reference."""
+"""Comparisons of runs of a case of any kind; for a scalar case, also the convergence of its reference."""
 
 import logging
 import math
@@ -35,11 +35,11 @@ _EXACT = 1e-9  # errors below this share of the solution are rounding, and show 
 def compare(
     bench: Bench[Case], reference: Run, candidates: Iterable[Run], error_bars: ErrorBars | None = None
 ) -> Comparison:
-    """Measure and judge the runs of the case of a ``bench``, over all its frames, and how its reference converges."""
+    """Measure and judge the runs of the case of a ``bench`` over all its frames, with the convergence of its reference."""
     case, setup = bench.scene, bench.setup()
     if case.parts:
         raise InputError(
-            case.place, "a comparison of several muscles as one", "the command compare, which has one for each"
+            case.place, "a comparison of several muscles as one", "the command compare, which compares each muscle"
         )
     complete_runs = tuple(complete(run, case.numbers) for run in candidates)
     result = comparison.compare(case, setup, complete(reference, case.numbers), complete_runs, error_bars)
@@ -47,7 +47,7 @@ def compare(
 
 
 def ladders(problem: CaseSetup, case: Case) -> tuple[Convergence, ...]:
-    """The convergence of the reference of a scalar ``case`` with elements of order 1 and 2, where its mesh can be refined."""
+    """The convergence of the reference of a scalar ``case`` with elements of order 1 and 2, if its mesh can be refined."""
     return () if problem.field is None else tuple(_ladders(problem.field, of_case.scalar_case(case)))
 
 
@@ -72,13 +72,13 @@ def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Convergence]:
     def error(built: FieldProblem, values: Floats) -> float:
         if exact is not None:
             return l2_distance(built.mesh, values, partial(scalar.at, exact))
-        # The vertices of a mesh come first in every finer one. All vertices of this mesh count: those of an irregular coarsest
+        # The vertices of a mesh come first in every finer mesh. All vertices of this mesh count: those of an irregular coarsest
         # mesh alone would converge with h^2 log h, not with h^2.
         count = len(built.mesh.points)
         return float(np.sqrt(np.mean((values[:count] - truth[:count]) ** 2)))
 
     for order in (1, 2):
-        # Without an exact solution, the finest one of order 2 is the truth for the others.
+        # Without an exact solution, the finest solution of order 2 is the truth for the others.
         finest = levels if order == 1 or case.exact is not None else levels - 1
         steps = [solved(order, level) for level in range(finest + 1)]
         errors = tuple(error(*step) for step in steps)

@@ -1,6 +1,6 @@
-"""The error of a solver with tetrahedra as a sum of parts: effects left out, its law, its mesh, its convergence.
+"""The error of a solver with tetrahedra as a sum of parts: effects left out, its law, its mesh and its convergence.
 
-References in between differ in one part each: without the effects, in the solver's law, on its linear tetrahedra.
+Intermediate references each change one part: without the effects, then in the solver's law, then on its linear tetrahedra.
 """
 
 import math
@@ -21,14 +21,14 @@ from fem_reference.studies.execution import Bench
 # Effects of a case that the law of a solver replaces.
 LAW = ("neo_hooke", "incompressible", "incompressible_penalty", "mooney_rivlin")
 PARTS = ("left out", "law", "mesh", "convergence")
-# The shear modulus, in bulk moduli, that is added to a law without shear stiffness at rest, whose equilibrium is not unique.
-# It moves the end of a bar that turns by 1 rad by 0.02 mm; with a tenth of it Newton's method does not always converge.
+# The shear modulus, as a share of the bulk modulus, that is added to a law without shear stiffness at rest, whose equilibrium is
+# not unique. It moves the end of a bar that turns by 1 rad by 0.02 mm; with a tenth of it, Newton's method may not converge.
 _WEAK = 1e-4
 
 
 @dataclass(frozen=True)
 class Split:
-    """The ``parts`` of an error and the ``total``, root mean squares [mm] over the surface at the ``frame`` where the total is
+    """The ``parts`` of an error and the ``total``, root mean squares [mm] over the surface at the ``frame`` at which the total is
     greatest, ``surface_deviation.rms``; the sum of the parts bounds it.
     """
 
@@ -39,7 +39,7 @@ class Split:
 
 def lame(case: MuscleCase, poisson: float) -> tuple[float, float]:
     """Lame's parameters mu and lambda [MPa] of the matrix of a ``case``, with a Poisson's ratio of at most ``poisson``; InputError
-    where it has no such law, or laws of regions.
+    if it has no such law, or laws of regions.
     """
     found = moduli([one for one in case.effects if name_of(one) in LAW])
     if (found.shear, found.bulk) != (moduli(case.effects).shear, moduli(case.effects).bulk):
@@ -53,7 +53,7 @@ def lame(case: MuscleCase, poisson: float) -> tuple[float, float]:
 
 def split(bench: Bench[MuscleCase], run: Run, law: Effect, takes: Collection[str] = ()) -> Split:
     """The parts of the error of a ``run`` by a solver with a ``law`` on linear tetrahedra of the case, without springs; ``takes``:
-    the other effects that it models. InputError where a reference in between has no solution.
+    the other effects that it models. InputError if an intermediate reference has no solution.
     """
     path = [bench.reference(), *_references(bench, law, takes), run]
     frames = np.isfinite(run.positions).all(axis=(1, 2))
@@ -82,13 +82,13 @@ def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -
         }
         made = Bench(case.model_copy(update=changed), bench.store).reference()
         if made.outcome.status != "converged":
-            got = f"a reference with {name_of(effects[0])} {element} that {made.outcome.status}: {made.outcome.message}"
+            got = f"a reference with {name_of(effects[0])} {element}, {made.outcome.status}: {made.outcome.message}"
             raise InputError(case.place, got, "one that reaches all frames")
         yield made
 
 
 def _check_held(bench: Bench[MuscleCase]) -> None:
-    """InputError where exact attachments would differ too much from the case: it has none, or springs whose stiffness times the
+    """Raise InputError if exact attachments would differ too much from the case: it has none, or springs whose stiffness times the
     muscle's size is below its shear modulus.
     """
     case, size = bench.scene, diagonal(bench.setup().surface.points)
@@ -110,12 +110,12 @@ def law_of(name: str, case: MuscleCase, poisson: float) -> Effect:
 
 
 def check_law(name: str, poisson: object, place: str) -> None:
-    """InputError at ``place`` if the reference has no such law with Lame's parameters, or ``poisson`` is no Poisson's ratio."""
+    """Raise InputError at ``place`` if the reference has no such law with Lame's parameters, or ``poisson`` is invalid."""
     known = [one for one in names(Energy) if {"mu", "lame"} <= find(one).model_fields.keys()]
     if name not in known:
         raise InputError(
-            f"{place}: law", f'"{name}"', f"{', '.join(known)}, or no key law: then the error is not split"
+            f"{place}: law", f'"{name}"', f"{', '.join(known)}, or no key law, so that the error is not split"
         )
     if not isinstance(poisson, float) or not 0 < poisson < 0.5:
         got = "nothing" if poisson is None else str(poisson)
-        raise InputError(f"{place}: settings.poisson", got, "the Poisson's ratio between 0 and 0.5 that goes with law")
+        raise InputError(f"{place}: settings.poisson", got, "the Poisson's ratio of the law, between 0 and 0.5")

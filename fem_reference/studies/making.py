@@ -1,4 +1,4 @@
-"""The making of a run: locked in its folder, frames stored as they are reached, watched for effects that its case omits."""
+"""Making of a run: its folder is locked, frames are stored as they are reached, and omitted effects are watched."""
 
 import logging
 import math
@@ -47,7 +47,7 @@ class Wanted:
     folder: Path
 
     def stored(self, ended: tuple[str, ...]) -> Run | None:
-        """The stored run, if its status is in ``ended``; None if it was made by other packages or lacks states that are wanted."""
+        """The stored run, if its status is in ``ended``; None if it was made with other packages or lacks wanted states."""
         run = store.finished(self.folder, ended)
         if run is None:
             return None
@@ -97,10 +97,10 @@ def seen(watch: Watch, folder: Path, numbers: Sequence[float]) -> Iterator[tuple
 
 
 def _stop_for(found: Sequence[Decision]) -> None:
-    """StoppedError where effects were ``found`` to matter."""
+    """Raise StoppedError if effects were ``found`` to matter."""
     if found:
         titles = " and ".join(one.effect.title for one in found)
-        raise StoppedError(f"{titles}, left out, turned out to matter at frame {found[0].turned_out}")
+        raise StoppedError(f"{titles}, which the case left out, turned out to matter at frame {found[0].turned_out}")
 
 
 def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None, time_limit: float = math.inf) -> None:
@@ -135,7 +135,7 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
     load = clock.load()
     used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()} | ({} if load is None else {LOAD: load})
-    outcome = replace(outcome, cost=used | cost)  # a solver with processes of its own states their use
+    outcome = replace(outcome, cost=used | cost)  # a solver with its own processes states their costs
     if not writer.frames:
         rest = writer.rest
         writer.add(Frame(writer.state["frames"][0], rest.surface.points, rest.fibres.points if rest.fibres else None))
@@ -144,9 +144,9 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
 
 
 def _contact(state: dict[str, Any]) -> dict[str, str]:
-    """A note where contact was in the equations of a run, by its ``state``."""
+    """A note on contact from the ``state`` of a run, if contact was in its equations."""
     counts = state["scalars"].get("contact_points")
     if counts is None:
         return {}
     pressed = [number for number, count in zip(state["numbers"], counts, strict=True) if count]
-    return {"contact": f"pressed first at frame {pressed[0]}" if pressed else "nothing was pressed at any frame"}
+    return {"contact": f"first contact at frame {pressed[0]}" if pressed else "no contact at any frame"}

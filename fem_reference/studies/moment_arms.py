@@ -1,4 +1,4 @@
-"""Hip moment arms of the reference's fibres beside published ones, on the report's anatomy, with coarse runs."""
+"""Hip moment arms of the reference's fibres compared with published ones, on the report's anatomy and coarse meshes."""
 
 import csv
 from collections.abc import Iterator
@@ -29,8 +29,8 @@ _FARTHEST = 1.0  # the flexion [rad] that a run must reach
 
 @dataclass(frozen=True)
 class ArmStudy:
-    """A ``case``, the size of its tetrahedra [mm], the least and greatest ``flexion`` [rad], its ``muscle`` in published files, the
-    ``sense`` of positive arms and the ``experiments`` beside it.
+    """A ``case``, the size of its tetrahedra [mm], the least and greatest ``flexion`` [rad], the name of its ``muscle`` in
+    published files, the ``sense`` of positive arms, and the ``experiments`` with which they are compared.
     """
 
     case: str
@@ -51,13 +51,13 @@ STUDIES = (
 
 
 def beside(store: Path) -> tuple[tuple[ArmsBeside, ...], dict[str, str]]:
-    """The arms of each wanted muscle beside each experiment, and by case the reason why one is missing."""
+    """The arms of each wanted muscle compared with each experiment, and the reason by case if they are missing."""
     found, missing = each({one.case: one for one in STUDIES}, lambda one: list(of_case(one, store)))
     return tuple(one for several in found.values() for one in several), missing
 
 
 def of_case(wanted: ArmStudy, store: Path) -> Iterator[ArmsBeside]:
-    """The arms of a case beside each of its experiments, as far as its run went; InputError where that is less than 1 rad."""
+    """The arms of a case compared with each of its experiments, as far as its run went; InputError if it did not reach 1 rad."""
     scene = casefile.read_muscle(wanted.case)
     (angles, arms), (others, larger) = (_arms(wanted, size * wanted.tet_size, store) for size in (1.0, LARGER))
     common = min(len(angles), len(others))  # both runs begin at the same angle
@@ -76,7 +76,7 @@ def of_case(wanted: ArmStudy, store: Path) -> Iterator[ArmsBeside]:
 
 
 def _arms(wanted: ArmStudy, tet_size: float, store: Path) -> tuple[Floats, Floats]:
-    """Angles (a,) [deg] and arms (a, k) [mm], positive in the sense that is wanted, on tetrahedra of ``tet_size`` [mm]."""
+    """Angles (a,) [deg] and arms (a, k) [mm], positive in the wanted sense, on tetrahedra of ``tet_size`` [mm]."""
     bench = Bench(coarse(casefile.read_muscle(wanted.case), tet_size, wanted.flexion), store)
     run = bench.reference()
     if run.outcome.status == "denied" or run.numbers[-1] / _RAD + 2 * wanted.flexion[0] < _FARTHEST:
@@ -106,7 +106,7 @@ def flexion_arms(run: Run, bench: Bench[MuscleCase]) -> tuple[Floats, Floats]:
     """Angles of flexion (a,) [deg], opposite to the joint's angle about the axis to the left, and arms of flexion (a, k) [mm]."""
     context = context_of(bench.setup(), run)
     if len(context.joints) != 1:
-        raise InputError(bench.scene.name, f"{len(context.joints)} joints", "one")
+        raise InputError(bench.scene.name, f"{len(context.joints)} joints", "one joint")
     flexion = -np.degrees(context.joints[0].angles(run.numbers))
     at = poses(flexion)
     return at, fitted_arms(flexion, both_lengths(run, run, context)[0], at)

@@ -1,4 +1,4 @@
-"""Error bars of several muscles that are solved together: in each further solution the cause of error is smaller in all muscles."""
+"""Error bars of several muscles solved together: in each further solution, one cause of error is smaller in all muscles."""
 
 import logging
 from collections.abc import Iterable
@@ -26,8 +26,8 @@ _LARGER = "larger tetrahedra"
 
 
 def coarser(case: MusclesCase) -> tuple[MusclesCase, float]:
-    """The case with larger tetrahedra in every muscle, and their size over that of its own: the same ratio for all, as errors of
-    one muscle reach its neighbours. Where all are refined, the last refinement is left out.
+    """The case with larger tetrahedra in every muscle, and the ratio of the sizes: the same for all, as errors of one muscle
+    reach its neighbours. If all muscles are refined, the last refinement is left out.
     """
     if all(one.refinements for one in muscles_of(case)):
         return with_muscles(case, lambda one: {"refinements": one.refinements - 1}), 2.0
@@ -35,11 +35,11 @@ def coarser(case: MusclesCase) -> tuple[MusclesCase, float]:
 
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> dict[str, ErrorBars]:
-    """The error bars of each muscle by name, from runs of all in the store or solved now; they are stored beside the ``reference``.
+    """The error bars of each muscle by name, from stored or new runs of all muscles; they are stored beside the ``reference``.
     With ``model``, also the change by exact attachments. Empty for a run that did not converge.
     """
     if reference.outcome.status != "converged":
-        log.info("error bar: none, of a reference that did not converge")
+        log.info("no error bars: the reference did not converge")
         return {}
     own, parts = cast("Bench[MusclesCase]", bench), bench.parts
     base, ratio = coarser(own.scene)
@@ -60,8 +60,8 @@ def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> dict[st
 
 
 def _parted(run: Run, reference: Run, names: Iterable[str]) -> Run:
-    """The ``run`` of a muscle, with no force on any of the ``names`` that it cannot touch but the ``reference`` can: with less
-    smoothing contact acts at shorter distances, and fewer muscles are near enough.
+    """The ``run`` of a muscle, with zero force on each of the ``names`` that it cannot touch but the ``reference`` can: with less
+    smoothing, contact acts at shorter distances, and fewer muscles are near enough.
     """
     none = 0.0 * run.positions[:, 0, 0]  # NaN in frames that are not known
     kinds = [f"{kind}_on_{name}" for kind in ("force", "moment") for name in names]
@@ -78,12 +78,12 @@ def _safety(bench: Bench[MusclesCase], parts: dict[str, Bench[MuscleCase]], name
 
 
 def bars(bench: Bench[Case], reference: Run, name: str) -> ErrorBars | None:
-    """The error bars of the muscle of a ``name``: stored ones, else those that :func:`obtain` makes of all."""
+    """The error bars of the muscle ``name``: stored ones, else those that :func:`obtain` computes for all muscles."""
     return (stored(bench, reference) or obtain(bench, reference)).get(name)
 
 
 def stored(bench: Bench[Case], reference: Run) -> dict[str, ErrorBars]:
-    """The error bars of each muscle that are stored beside a reference; empty where those of any are missing."""
+    """The error bars of each muscle that are stored beside a reference; empty if those of any muscle are missing."""
     found = {name: refinement.stored(reference, name) for name in bench.parts}
     known = {name: one for name, one in found.items() if one is not None}
     return known if len(known) == len(found) else {}

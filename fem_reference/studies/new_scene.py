@@ -1,4 +1,4 @@
-"""New scenes: a copy of a case, or one made from the surfaces of a muscle and its bones."""
+"""New scenes: a copy of a case, or a scene made from the surfaces of a muscle and its bones."""
 
 import re
 import shutil
@@ -24,9 +24,9 @@ from fem_reference.scenes import casefile
 _GUESSED = ("mm", "cm", "m", "in")
 # The range of lengths of muscles and bones [mm]: a unit that gives another length is ruled out.
 _LONG = {"muscle": (20.0, 700.0), "bone": (5.0, 2500.0)}
-# The greatest distance of a muscle from its bones, in lengths of the muscle; at a greater one the files do not fit together.
+# The greatest distance of a muscle from its bones, in lengths of the muscle; at a greater distance the files do not fit together.
 _APART = 0.5
-# The share of vertices that are attached, those nearest to a bone; it is reduced where two attachments would share some.
+# The share of vertices that are attached, those nearest to a bone; it is reduced if two attachments would share vertices.
 _ATTACHED = (0.06, 0.04, 0.025, 0.015, 0.008)
 _TETS, _REFINEMENTS = 5000, 1
 _LONGEST = 60  # the number of characters that are kept of a name that is unfit for a scene or a file
@@ -59,7 +59,7 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
     """Write a scene into a new ``folder``, which names it, with the surfaces in mm; return the unit in which they were read.
 
     ``muscle`` and ``bones`` are files of triangles. The muscle is attached to the two bones nearest to it, and the second of these
-    moves. ``unit``: that of all files, one of ``LENGTH_UNITS``; None: the only one that gives muscle and bones a usual length.
+    moves. ``unit``: the unit of all files, of ``LENGTH_UNITS``, or None: the only one that gives muscle and bones a usual length.
     InputError names the unusable file, or the value that cannot be guessed.
     """
     if len(bones) < 2:
@@ -95,7 +95,7 @@ def write(folder: Path, muscle: Surface, bones: dict[str, Surface]) -> None:
 
 
 def is_name(name: str) -> bool:
-    """True where ``name`` is allowed as a name in a scene file."""
+    """True if ``name`` is allowed as a name in a scene file."""
     try:
         return bool(check_name(name))
     except ValueError:
@@ -109,7 +109,7 @@ def _cleaned(name: str) -> str:
 
 
 def _distinct(name: str, taken: Container[str]) -> str:
-    """The ``name``, with a number where it is ``taken``."""
+    """The ``name``, with a number if it is ``taken``."""
     numbered = (f"{name}_{i}" for i in count(2))
     return name if name not in taken else next(one for one in numbered if one not in taken)
 
@@ -124,7 +124,7 @@ def _new(folder: Path) -> Path:
 
 
 def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
-    """The only unit in which the size of every surface is possible; InputError where no unit or several ones are."""
+    """The only unit in which the size of every surface is possible; InputError if none or several are possible."""
     fitting, said = list[set[str]](), list[str]()
     for surface, kind in ((muscle, "muscle"), *((bone, "bone") for bone in bones)):
         size, (least, most) = diagonal(surface.points), _LONG[kind]
@@ -135,7 +135,7 @@ def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
     shared, why = set.intersection(*fitting), "; ".join(said)
     if len(shared) != 1:
         what = "several units suit" if shared else "no unit suits"
-        raise InputError("--unit", f"none, where {why}: {what} all of them", f"one of {', '.join(LENGTH_UNITS)}")
+        raise InputError("--unit", f"no unit, but {why}: {what} all of them", f"one of {', '.join(LENGTH_UNITS)}")
     return Unit(shared.pop(), why)
 
 
@@ -155,13 +155,13 @@ def _attachments(muscle: Surface, bones: dict[str, Surface]) -> tuple[_Attached,
     first, second = sorted(away, key=lambda name: float(np.quantile(away[name], _ATTACHED[-1])))[:2]
     for name in (first, second):
         if (gap := float(away[name].min())) > _APART * diagonal(muscle.points):
-            got = f'the bone "{name}" {gap:.3g} mm from it, which is {diagonal(muscle.points):.3g} mm long'
-            raise InputError(muscle.place, got, "surfaces in one unit (--unit) that are beside each other")
+            got = f'the bone "{name}" {gap:.3g} mm from the muscle, which is {diagonal(muscle.points):.3g} mm long'
+            raise InputError(muscle.place, got, "surfaces in one unit (--unit) that are near each other")
     for share in _ATTACHED:
         one, other = (_nearest(name, away[name], share) for name in (first, second))
         if not np.intersect1d(one.vertices, other.vertices).size:
             return one, other
-    got = f"{first} and {second} at the same end of it"
+    got = f"{first} and {second} at the same end of the muscle"
     raise InputError(muscle.place, got, "bones at either end (or a scene of your own with lists of vertices)")
 
 
@@ -172,7 +172,7 @@ def _nearest(bone: str, away: Floats, share: float) -> _Attached:
 
 
 def _text(name: str, muscle: Surface, bones: dict[str, Surface], paths: dict[str, str]) -> str:
-    """The text of the scene file; ``paths`` of surfaces beside it, by name."""
+    """The text of the scene file; ``paths`` are those of the surfaces, by name."""
     ends = _attachments(muscle, bones)
     volume = enclosed_volume(muscle.points, muscle.triangles)
     wanted = np.cbrt(6 * np.sqrt(2) * volume / _TETS * 8**_REFINEMENTS)
@@ -209,7 +209,7 @@ def _text(name: str, muscle: Surface, bones: dict[str, Surface], paths: dict[str
 
 
 def _joint(muscle: Surface, bones: dict[str, Surface], ends: tuple[_Attached, _Attached]) -> tuple[Floats, Floats]:
-    """A guess of the axis and the centre of the motion between two bones: across the muscle, where the bones are nearest."""
+    """A guess of the axis and the centre of the motion between two bones: across the muscle, at the bones' nearest points."""
     first, second = (bones[end.bone].points for end in ends)
     away, which = cKDTree(first).query(second)
     nearest = int(away.argmin())

@@ -1,4 +1,4 @@
-"""Changes by leaving out each effect of a scene in turn, or each optional feature of a solver, and all of them."""
+"""Changes due to leaving out each effect of a scene in turn, or each optional feature of a solver, and all of them."""
 
 import logging
 import math
@@ -48,7 +48,7 @@ class LeftOut:
 
 
 def study(case: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
-    """The reference and the candidates of a case, whole and with each part left out; runs in ``store`` are not solved again."""
+    """The reference and the candidates of a case, complete and with each part left out; runs in ``store`` are not solved again."""
     with fenicsx.shared():
         if workers == Workers():
             _warm_up(case, store)
@@ -79,7 +79,7 @@ def name_of(effect: Effect) -> str:
 
 
 def features(choice: SolverChoice, place: str) -> tuple[str, ...]:
-    """The optional features of a choice: keys whose default is None, except those for accuracy against time, or for time only."""
+    """The optional features of a choice: keys with default None, except those that trade accuracy for time or change time only."""
     record = solvers.find(choice.solver, place).settings
     optional = {key for key, entry in record.model_fields.items() if entry.default is None}
     optional -= {*solvers.trades(record), *MACHINE_ONLY}
@@ -88,7 +88,7 @@ def features(choice: SolverChoice, place: str) -> tuple[str, ...]:
 
 def parts(whole: Trial) -> tuple[LeftOut, ...]:
     """Everything that can be left out of a trial: each effect of the scene except its material, if the solver simulates effects,
-    else each feature of the solver; and all of them together. Something elastic always remains. Tension at rest is left out
+    else each feature of the solver; and all of them together. An elastic effect always remains. Tension at rest is left out
     together with all that it balances: effects that act at the first frame, and the support by bones.
     """
     if not solvers.takes_effects(whole.choice.solver):
@@ -130,7 +130,7 @@ def _kept(case: MuscleCase, part: LeftOut) -> tuple[Effect, ...]:
 
 
 def fitting(element: str, effects: Sequence[Effect]) -> str:
-    """The element with the cells and the displacement of ``element`` that has a pressure if and only if an effect brings it."""
+    """The element with the cells and the displacement of ``element`` that has a pressure if and only if an effect adds it."""
     kind, degree, pressure = ELEMENTS[element]
     brings = any("pressure" in effect.unknowns for effect in effects)
     if (pressure is not None) == brings:
@@ -204,7 +204,7 @@ def _omission(one: Made, left_out: tuple[str, ...]) -> Omission:
 
 
 def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:
-    """The displacement of the surface by an effect that alone is left out, as its indicator estimates it."""
+    """The displacement of the surface due to the only effect left out, estimated by its indicator; empty for other parts."""
     if len(part.effects) != 1:
         return {}
     (left_out,) = part.effects.values()

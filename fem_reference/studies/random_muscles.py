@@ -1,4 +1,4 @@
-"""Muscles drawn at random by a seed, as cases: a spindle or strap between two bones, with motion and activation."""
+"""Random muscles as cases, determined by a seed: a spindle or strap between two bones, with motion and activation."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +11,7 @@ from fem_reference.io import files
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 
-EVERY = 10  # frame numbers from a pose to the next
+EVERY = 10  # frame numbers from one pose to the next
 _AROUND, _ALONG = 20, 21  # the vertices around and along every surface; vertex i is at the same part of each
 _TETS = 150  # the approximate number of tetrahedra, each of which is then cut into eight
 _MOTION = "motion = {{ {kind}, keyframes = [{keys}] }}\n"
@@ -45,7 +45,7 @@ pennation = "{:.4g} deg\""""
 
 
 def shape(rng: np.random.Generator) -> tuple[Surface, float]:
-    """A closed surface along z, with elliptic sections and flat ends at 0 and at its length [mm]; surface and length."""
+    """A closed surface along z, with elliptical sections and flat ends at 0 and at its length [mm]; surface and length."""
     length, wide = rng.uniform(50, 110), rng.uniform(9, 16)
     flat, first, last = rng.uniform(0.55, 1), rng.uniform(0.5, 0.95), rng.uniform(0.5, 0.95)
     belly, bow = rng.uniform(0.35, 0.65), rng.uniform(0, 0.1) * length
@@ -85,7 +85,7 @@ def _turn(axis: Sequence[float], centre: Sequence[float], amounts: Floats) -> st
 
 
 def write(folder: Path, seed: int, number: int, poses: int) -> MuscleCase:
-    """Write muscle ``number`` of a ``seed`` into a ``folder``, with this number of random ``poses`` beside rest. The lower bone
+    """Write muscle ``number`` of a ``seed`` into a ``folder``, with a number of random ``poses`` besides rest. The lower bone
     turns about an axis beside the muscle. Of every three muscles, two have an upper bone that turns about another axis, one has an
     obstacle that slides into its side, and two are activated. The seed and the number determine all random values.
     """

@@ -1,4 +1,4 @@
-"""Runs for error bars: on coarser tetrahedra, and on these with each other cause of numerical error halved."""
+"""Runs for error bars: on coarser tetrahedra, and on these with one other cause of numerical error halved at a time."""
 
 import hashlib
 import logging
@@ -42,16 +42,16 @@ from fem_reference.studies.variations import (
 log = logging.getLogger(__name__)
 
 EXACT = "exact attachments"
-# Files, besides the metrics, whose code makes error bars, or denies the runs that they come from.
+# Files, besides the metrics, whose code computes error bars or rejects the runs that they come from.
 _OF_BARS = [
     str(one.__file__) for one in (differences, error_bars, force_bars, views, second_check, run_checks, neighbours)
 ]
 MAKING = (*map(Path, _OF_BARS), *map(Path(__file__).with_name, ("muscle_bars.py", "refinement.py", "variations.py")))
 
-# The coarse run of a scene with refined tetrahedra omits the last refinement; that of any other scene has a mesh of its own, with
+# The coarse run of a scene with refined tetrahedra omits the last refinement; that of any other scene has its own mesh, with
 # tetrahedra larger by this factor.
 RATIO = 1.5
-# Error bars are made without request if they take at most this share of the reference's time, estimated by numbers of tetrahedra.
+# Without a request, error bars are computed only if they take at most this share of the reference's time, by tetrahedra.
 CHEAP = 0.2
 
 # A quadratic element has as many unknowns on the same cells as a linear one on cells of half the size, and does not lock.
@@ -64,7 +64,7 @@ def variations[C: DrivenCase](
     case: C, settings: Record, *, pressed: bool = True, touched: bool = True
 ) -> dict[str, Vary[C]]:
     """Changes, by name, each of which halves a cause of numerical error other than tetrahedra: compliance and smoothing of contact
-    with bones, if one ``pressed``, and of muscles with themselves or each other, if any ``touched``; error and rounding of
+    with bones, if any ``pressed``, and of muscles with themselves or each other, if any ``touched``; error and rounding of
     distances to bones; load steps, if the ``settings`` have them and a state depends on them: with drag, viscosity or friction.
     """
     found, bones = dict[str, Vary[C]](), among(case.effects) if pressed else None
@@ -93,10 +93,10 @@ def half_steps[C: DrivenCase](case: C, settings: Record) -> Vary[C]:
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars | None:
     """The error bars of the ``reference`` of a bench, from runs in the store or solved now; they are stored beside the reference.
-    With ``model``, also the change by exact attachments. None for a run that did not converge, and for one without an interior.
+    With ``model``, also the change by exact attachments. None for a run that did not converge or has no interior.
     """
     if reference.outcome.status != "converged" or reference.fibres is None or not reference.has_surface:
-        log.info("error bar: none, of a reference that did not converge or has no interior")
+        log.info("no error bars: the reference did not converge or has no interior")
         return None
     own = bench.of_muscle()
     with fenicsx.shared():
@@ -105,8 +105,8 @@ def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBa
 
 
 def made(pair: Pair, bench: Bench[MuscleCase], folder: Path | None, reference: Run) -> ErrorBars:
-    """The error bars of a ``pair`` of runs of the muscle of a bench; stored in a ``folder``, if given, as of ``reference``."""
-    log.info("error bar: measuring the runs against each other")
+    """The error bars of a ``pair`` of runs of the muscle of a bench; stored in a ``folder``, if given, for ``reference``."""
+    log.info("error bar: comparing the runs")
     context = context_of(bench.setup(), pair.fine)
     bars = error_bars.error_bars(pair, context)
     bars = replace(bars, bars=(*bars.bars, *force_bars.force_bars(pair, context)))
@@ -133,12 +133,12 @@ def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | N
     count = 1 + len(needed(own, reference))
     if count * (fine / coarse) ** 3 > CHEAP:
         return None
-    log.info("error bar: made without being asked for, as it takes less than a fifth of the time")
+    log.info("error bar: computed without a request, as it takes less than a fifth of the time")
     return obtain(bench, reference, model=False)
 
 
 def stored(reference: Run, muscle: str = "") -> ErrorBars | None:
-    """The error bars stored beside a reference run, of one ``muscle`` of several; None if none are of this run and metrics."""
+    """The error bars stored beside a reference run, of one ``muscle`` of several; None without bars of this run and metrics."""
     if reference.folder is None:
         return None
     folder = reference.folder / muscle
@@ -149,7 +149,7 @@ def stored(reference: Run, muscle: str = "") -> ErrorBars | None:
 
 
 def needed[C: DrivenCase](bench: Bench[C], reference: Run) -> dict[str, Vary[C]]:
-    """The variations that can change a reference: those of contact only if something was pressed."""
+    """The variations that can change a reference: those of contact only if there was contact."""
     areas = [reference.scalars.get(f"{name}_area") for name in ("contact", "touching")]
     pressed, touched = (area is None or bool(np.nanmax(area) > 0) for area in areas)
     settings = bench.settings(bench.scene.reference, "reference")
@@ -189,7 +189,7 @@ def solutions[C: DrivenCase](
     found = {}
     for i, (name, changed) in enumerate(scenes.items()):
         left = seconds * (len(scenes) - i)
-        log.info("error bar: run %d of %d, %s; about %.0f s for what is left", i + 1, len(scenes), name, left)
+        log.info("error bar: run %d of %d, %s; about %.0f s left", i + 1, len(scenes), name, left)
         try:
             found[name] = _solved(bench, changed, name, reference)
         except InputError as error:
@@ -201,10 +201,10 @@ def solutions[C: DrivenCase](
 
 
 def check_coarser(bench: Bench[MuscleCase], fine: float, coarse: float) -> None:
-    """InputError unless a mesh of ``coarse`` tetrahedra has fewer than one of ``fine``."""
+    """Raise InputError unless the number of ``coarse`` tetrahedra is below that of ``fine`` ones."""
     if not coarse < fine:
         got = f"meshes of {fine:.0f} and {coarse:.0f} tetrahedra"
-        raise InputError(f"{bench.scene.place}: muscle.tet_size", got, "a size for which a coarser mesh differs")
+        raise InputError(f"{bench.scene.place}: muscle.tet_size", got, "a size that can be coarsened")
 
 
 def safety(bench: Bench[MuscleCase]) -> float:
@@ -220,7 +220,7 @@ def safety(bench: Bench[MuscleCase]) -> float:
 
 
 def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
-    """The case with larger tetrahedra, and the sizes [mm] of its own and of these."""
+    """The case with larger tetrahedra, and the sizes [mm] of its own and of the larger tetrahedra."""
     size, refinements = case.muscle.tet_size, case.muscle.refinements
     if refinements:
         larger = on_tetrahedra(case, refinements=refinements - 1)
@@ -229,7 +229,7 @@ def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
 
 
 def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) -> tuple[Bench[C], Run]:
-    """The bench of a changed scene, and its run over the frames of ``reference``: NaN where not reached, and if it is denied."""
+    """The bench of a changed scene, and its run over the frames of ``reference``: NaN if not reached or if the run is denied."""
     other = Bench(case, bench.store, bench.ranks)
     try:
         run = other.obtain(f"reference, {name}", without_states(case.reference), "reference")
@@ -243,7 +243,7 @@ def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) 
 
 def _of(reference: Run) -> dict[str, str]:
     """The identity of error bars: this run, measured by these metrics."""
-    assert reference.folder is not None  # the caller asked
+    assert reference.folder is not None  # the caller has checked this
     return {"run": reference.folder.name, "metrics": _measuring_hash()}
 
 
@@ -257,15 +257,15 @@ def _measuring_hash() -> str:
 
 
 def tets(run: Run, fact: str = "tets") -> float:
-    """The number of tetrahedra of a run by the name of the ``fact``, NaN where it is not stated."""
+    """The number of tetrahedra of a run by the name of the ``fact``, NaN if it is not stated."""
     found = run.origin.get("mesh", {}).get(fact)
     return found if isinstance(found, float | int) else math.nan
 
 
 def body_bars(solved: Run) -> BodyBars | None:
-    """The error bars of a run by :func:`solve_body`; None where that did not converge."""
+    """The error bars of a run by :func:`solve_body`; None if that did not converge."""
     if solved.outcome.status != "converged":
-        log.info("error bars: none, of a body that did not converge")
+        log.info("no error bars: the body did not converge")
         return None
     settings, body = solved.settings, solved.body
     assert isinstance(settings, fenicsx.BodySettings)  # FEniCSx solved the body
@@ -277,7 +277,7 @@ def body_bars(solved: Run) -> BodyBars | None:
         log.info("error bars: with %s: %s, %s", sharper, found.outcome.status, found.outcome.message)
     states = () if found.outcome.status == "denied" else found.states
     bars = error_bars.body_bars(solved.states, states, shared, sharper)
-    log.info("error bars: displacement is known to %.2g %% of itself at the last frame", 100 * bars.displacement[-1])
+    log.info("error bars: displacement is known to %.2g %% at the last frame", 100 * bars.displacement[-1])
     return bars
 
 

@@ -28,18 +28,18 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# Cases of our own, which need no data, then cases with the report's anatomy, in the order of their cost.
+# Our own cases, which need no data, then cases with the report's anatomy, in the order of their cost.
 CASES = (
     *("hip_flexion_tendon", "hip_flexion", "box_squeeze"),
     *("adductor_brevis", "gluteus_medius", "iliacus_anatomical", "box_squeeze_report", "gluteus_maximus"),
 )
 # The default limit of processor time [s] for a solver on a case.
 TIME_LIMIT = 600.0
-# The entry for the machine where frames were submitted with their time.
+# The entry for the machine if frames were submitted with their time.
 THEIRS = "as stated by its authors"
-# The distance [mm] (rms) from rest up to which the reference counts as back at the last frame; only then solvers' are measured.
+# The distance [mm] (rms) up to which the reference counts as back at rest in the last frame; only then are solvers measured there.
 _BACK = 0.1
-# The metrics of all rows; the joint moment only where a solver has forces.
+# The metrics of all rows; the joint moment only if a solver has forces.
 _METRICS = (*in_tables(), "joint_moment")
 
 
@@ -94,7 +94,7 @@ def stand(
     time_limit: float = TIME_LIMIT,
 ) -> Standings:
     """The standings of our solvers and the ``entrants`` over ``scenes``, with runs in ``store``; each may take ``time_limit`` [s]
-    of processor time on a case, whatever it states itself. Of the rows ``before``, those of other cases are kept; if ``only`` names
+    of processor time on a case, whatever its own limit is. Of the rows ``before``, those of other cases are kept; if ``only`` names
     states (``STATES``), rows in other states are kept too.
     """
     _check_names(entrants)
@@ -111,19 +111,19 @@ def stand(
             missing[scene.name] = str(error)
     for one in entrants:
         if one.case not in ("", *asked):
-            missing[f"{one.case}, {one.candidate.name}"] = f"this case is not solved here, only {', '.join(asked)}"
+            missing[f"{one.case}, {one.candidate.name}"] = f"not one of the cases solved here: {', '.join(asked)}"
     done = {row.case for row in rows}
     rows += [row.kept(row.case in missing) for row in before if row.case not in done]
     return Standings(rows=tuple(rows), missing=missing, changes=standings.changes(before, rows))
 
 
 def _check_names(entrants: Sequence[Entrant]) -> None:
-    """InputError where two entrants with the same name have a case in common."""
+    """Raise InputError if two entrants with the same name have a case in common."""
     cases = dict[str, list[str]]()
     for one in entrants:
         others = cases.setdefault(one.candidate.name, [])
         if others and (one.case in ("", *others) or "" in others):
-            raise InputError(one.candidate.name, "two solvers of this name on a case", "names that differ")
+            raise InputError(one.candidate.name, "two solvers of this name on a case", "different names")
         others.append(one.case)
 
 
@@ -136,7 +136,7 @@ def _on(
 ) -> Iterator[Standing]:
     case, reference = bench.scene, complete(bench.reference(), bench.scene.numbers)
     if reference.outcome.status != "converged":
-        got = f"a reference that {reference.outcome.status}: {reference.outcome.message}"
+        got = f"a reference with status {reference.outcome.status}: {reference.outcome.message}"
         raise InputError(case.place, got, "one that reaches all frames")
     measured = _Measured(bench, reference, context_of(bench.setup(), reference), missing)
     truth = Candidate(name="reference", **case.reference.model_dump())
@@ -149,7 +149,7 @@ def _on(
             if name in taken and one not in ours:
                 raise InputError(name, "the name of one of our solvers", "another name")
             if one.scene not in ("", case.key):
-                raise InputError(f"{name}: scene", f'"{one.scene}"', f'"{case.key}", the present key')
+                raise InputError(f"{name}: scene", f'"{one.scene}"', f'"{case.key}", the current key')
             key = measured.key(one)
             old = known.get(name)
             if old is not None:
@@ -189,7 +189,7 @@ class _Measured:
         return made(one.candidate.name, one.candidate, one.candidate.name)
 
     def row(self, one: Entrant, run: Run, key: str) -> Standing:
-        """The row of a run of this ``key``; late where it took more than the time limit, even if stored under another limit."""
+        """The row of a run of this ``key``; late if it took more than the time limit, even if stored under another limit."""
         own = run is self.reference
         submitted = one.candidate.solver == "recorded"  # then its time was measured on another machine
         limit = None if own or submitted else self.bench.time_limit
@@ -224,7 +224,7 @@ class _Measured:
         )
 
     def _split(self, one: Entrant, run: Run) -> dict[str, float]:
-        """The parts of the error of a solver that states its law, if it and the references in between reached all frames."""
+        """The parts of the error of a solver that states its law, if its run and the intermediate references reached all frames."""
         if one.law is None or run.outcome.status != "converged":
             return {}
         try:
@@ -236,6 +236,6 @@ class _Measured:
 
 
 def _from_rest(run: Run, reference: Run) -> float | None:
-    """The distance [mm] (rms) from the first to the last frame; None where the reference does not come back."""
+    """The distance [mm] (rms) from the first to the last frame; None if the reference does not return to rest."""
     away = [np.sqrt(np.mean(np.sum((one.positions[-1] - one.positions[0]) ** 2, axis=1))) for one in (run, reference)]
     return float(away[0]) if away[1] <= _BACK and np.isfinite(away[0]) else None

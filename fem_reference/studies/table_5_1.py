@@ -105,7 +105,7 @@ def chosen(case: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Cand
 
 
 def needs(case: MuscleCase, choice: SolverChoice, context: MeasurementContext) -> dict[str, int]:
-    """The parameters that a solver needs on a case: settings, those of the effects that it simulates, attachments, shapes of
+    """The parameters that a solver needs on a case: settings, parameters of the effects that it simulates, attachments, shapes of
     bones that it avoids, and fibres. Empty for recorded frames.
     """
     offer = solvers.find(choice.solver, "")
@@ -127,7 +127,7 @@ def needs(case: MuscleCase, choice: SolverChoice, context: MeasurementContext) -
 
 
 def stated(record: Record) -> int:
-    """The number of values of a ``record`` that are required or differ from defaults; values of inner records count one by one."""
+    """The number of values of a ``record`` that are required or differ from defaults; values of nested records count one by one."""
     fields = type(record).model_fields.items()
     given = [(field, getattr(record, key)) for key, field in fields]
     return sum(_leaves(value) for field, value in given if field.is_required() or value != field.default)

@@ -1,4 +1,4 @@
-"""True errors to check error bars against, by finer solutions: on smaller tetrahedra, with stiffer contact."""
+"""True errors from finer solutions (smaller tetrahedra, stiffer contact), with which error bars are compared."""
 
 from collections.abc import Iterable
 from functools import partial
@@ -25,7 +25,7 @@ CASES = (
 
 
 def stake(scenes: Iterable[MuscleCase], store: Path) -> Claims:
-    """The claims of the references of ``scenes``, with runs in ``store``, solved where they are missing."""
+    """The claims of the references of ``scenes``, with runs in ``store``, solved if they are missing."""
     named = {scene.name: scene for scene in scenes}
     found, missing = each(named, partial(_of, store=store))
     why = "its reference, or the finer solution, did not reach all frames"
@@ -50,7 +50,7 @@ def _of(case: MuscleCase, store: Path) -> list[Claim]:
 
 
 def claims_of(case: str, bars: ErrorBars, runs: tuple[Run, Run], context: MeasurementContext) -> list[Claim]:
-    """Claims of ``bars`` about changes from rest and deviations of the first of two runs; the second is a sharper solution."""
+    """Claims of ``bars`` about changes from rest and deviations of the first of two runs; the second is more accurate."""
     names = dict.fromkeys(metric for metric, _ in CLAIMED)
     changes = [change(one, context, names) for one in runs]
     surfaces = [as_surface(one) for one in runs]

@@ -1,4 +1,4 @@
-"""The bands of results that uncertain parameters of a case allow, by runs of its reference on a Latin hypercube."""
+"""Bands of results that uncertain parameters of a case allow, from runs of its reference on a Latin hypercube."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -21,7 +21,7 @@ from fem_reference.studies.campaign import Workers, carry_out, shared_bench
 from fem_reference.studies.unknowns import Unknowns, unknowns
 from fem_reference.studies.variations import Trial
 
-# The quantities with a band, besides the surface and forces, where a case has them.
+# The quantities with a band, besides the surface and forces, if a case has them.
 QUANTITIES = ("volume.deviation", "fibre_length.mean", "moment_arm.mean", "joint_moment.moment")
 SURFACE = ("surface_deviation", "rms")
 FORCE = "force on "
@@ -39,7 +39,7 @@ def study(case: MuscleCase, store: Path, workers: Workers, runs: int, seed: int 
     with fenicsx.shared():
         reference = shared_bench(case, store).reference()
         if reference.outcome.status != "converged":
-            said = f"the reference {reference.outcome.status}: {reference.outcome.message}"
+            said = f"the reference has the status {reference.outcome.status}: {reference.outcome.message}"
             return replace(empty, refused=said)
         comparison, lost = _nominal(case, reference, store, workers)
         made = carry_out(trials, store, workers)

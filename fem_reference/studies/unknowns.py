@@ -12,8 +12,8 @@ from fem_reference.scenes.muscle import MuscleCase
 
 @dataclass(frozen=True)
 class Unknowns:
-    """A case as in its file (``whole``), whose effects the keys number, and the indices of the effects that act (``kept``): with
-    ``effects = "auto"``, in all runs, those that the case needs with its own values.
+    """A case as in its file (``whole``), whose keys refer to effects by number, and the indices of the effects that act (``kept``).
+    With ``effects = "auto"``, these are, in all runs, the effects that the case needs with its own values.
     """
 
     whole: MuscleCase
@@ -25,7 +25,7 @@ class Unknowns:
         return self.at({})
 
     def at(self, values: dict[str, float]) -> MuscleCase:
-        """The case with other ``values`` by key, in internal units; InputError where a file could not have them."""
+        """The case with other ``values`` by key, in internal units; InputError if a file could not state them."""
         changed = casefile.with_numbers(self.whole, values)
         acting = tuple(changed.effect[i] for i in self.kept)
         return changed.model_copy(update={"effect": acting, "choice": "listed", "decisions": (), "uncertain": ()})
@@ -36,7 +36,7 @@ class Unknowns:
         return first != "effect" or others[0] in self.kept
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """The parameters that have a range; InputError where there are none, or one belongs to an effect that is left out."""
+        """The parameters that have a range; InputError if there are none, or one belongs to an effect that is left out."""
         case, found = self.whole, []
         for i, entry in enumerate(case.uncertain):
             if not self.acts(entry.key):

@@ -1,4 +1,4 @@
-"""Variations of a case: single changes, and the ladders of a study, which vary one setting at a time."""
+"""Variations of a case: single changes, and the trials of a study, which vary one setting at a time."""
 
 import hashlib
 from collections.abc import Iterator, Mapping
@@ -40,18 +40,18 @@ def on_tetrahedra[C: DrivenCase](case: C, **changes: float) -> C:
 
 
 def on_larger[C: DrivenCase](case: C, ratio: float) -> C:
-    """The case on tetrahedra of ``ratio`` times the size, in each of several muscles."""
+    """The case on tetrahedra of ``ratio`` times the size, in each of its muscles."""
     return with_muscles(case, lambda one: {"tet_size": ratio * one.tet_size})
 
 
 def with_contact[C: DrivenCase](case: C, kind: type[Effect] = Contact, **changes: float) -> C:
-    """The case with other parameters of its contact, of a ``kind``: with bones, or of muscles with themselves or each other."""
+    """The case with other parameters of its contact of a ``kind``: with bones, or of muscles with themselves or each other."""
     effects = (one.model_copy(update=changes) if isinstance(one, kind) else one for one in case.effect)
     return case.model_copy(update={"effect": tuple(effects)})
 
 
 def by_springs(case: MuscleCase) -> bool:
-    """True where an attachment is by springs."""
+    """True if any attachment has springs."""
     return any(entry.stiffness is not None for entry in case.attachment)
 
 
@@ -70,7 +70,7 @@ def without_states(choice: SolverChoice) -> SolverChoice:
 
 
 def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
-    """The case on a surface of ``4**power`` times as many triangles; its files, named by their contents, go into ``folder``.
+    """The case on a surface with ``4**power`` times as many triangles; its files, named by their contents, go into ``folder``.
 
     A vertex is attached if the nearest vertex of the original surface is.
     """
@@ -93,14 +93,14 @@ def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> Muscle
 
 
 def nearest_vertices(surface: Surface, points: Floats) -> Floats:
-    """The nearest vertex of the nearest triangle to each of ``points`` (n, 3), (n,)."""
+    """The vertices (n,) nearest to ``points`` (n, 3): corners of the nearest triangles, by barycentric coordinates."""
     found = distances(points, surface)
     corners = surface.triangles[found.triangle]
     return np.asarray(np.take_along_axis(corners, found.barycentric.argmax(axis=1)[:, None], axis=1)[:, 0])
 
 
 def carried(run: Run, surface: Surface) -> Run:
-    """A ``run`` on another surface, carried to the vertices of ``surface`` by the same extension by which fibres are carried."""
+    """A ``run`` on another surface, carried to the vertices of ``surface`` by the extension that also carries fibres."""
     if len(run.surface.points) == len(surface.points) and np.allclose(run.surface.points, surface.points):
         return run
     extension = Extension.to(surface.points, run.surface)
@@ -123,11 +123,11 @@ class Trial:
 
     @property
     def label(self) -> str:
-        """Its name in progress messages."""
+        """The name of the trial in progress messages."""
         return f"{self.name}, {self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
 
     def varied(self, knob: str, value: str, **changes: Any) -> "Trial":
-        """The trial with ``changes`` of its fields, named by a ``knob`` in addition to the former one."""
+        """The trial with ``changes`` of its fields, named by a ``knob`` in addition to its former one."""
         beside = f" ({self.knob} = {self.value})" if self.knob else ""
         return replace(self, knob=knob, value=value + beside, **changes)
 
@@ -166,7 +166,7 @@ def candidate_trials(case: MuscleCase, surfaces: Mapping[str, MuscleCase]) -> It
 
 
 def _sizes(whole: Trial) -> Iterator[Trial]:
-    """A trial on other tetrahedra."""
+    """Trials on other tetrahedra."""
     own = whole.scene.muscle
     for count in range(own.refinements + 1):
         for factor in _SIZES:
@@ -184,7 +184,7 @@ def _on(whole: Trial, size: float, refinements: int) -> Trial:
 
 
 def _settings(base: Trial) -> Iterator[Trial]:
-    """A trial for each value on the ladder of each setting, except its own value and those that its other settings exclude."""
+    """A trial for each listed value of each setting, except its own value and values that its other settings exclude."""
     own = solvers.settings(base.choice, base.name)
     for key, values in solvers.trades(type(own)).items():
         for value in values:
@@ -199,7 +199,7 @@ def _settings(base: Trial) -> Iterator[Trial]:
 
 
 def _by_element(base: Trial, choice: SolverChoice, text: str) -> Trial:
-    """The trial with another element; if it does not suit the effects, with the same volumetric energy with or without pressure."""
+    """The trial with another element; if it does not suit the effects, a penalty replaces the pressure, or the reverse."""
     plain, effects = base.varied("element", text, choice=choice), list(base.scene.effects)
     found = [one for one in effects if isinstance(one, Incompressible | IncompressiblePenalty)]
     if len(found) != 1 or _suits(choice, base.scene.effects):

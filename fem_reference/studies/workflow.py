@@ -1,4 +1,4 @@
-"""The steps from a case to a page, one call each: the Python API."""
+"""Python API: the steps from a case to a page, one call each."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -25,9 +25,9 @@ STORE = Path("reports/runs")
 
 
 def load_case(case: str | Path, changes: Mapping[str, object] | None = None) -> Case:
-    """Read a ``case``: the name of a shipped one, a folder with a ``case.toml``, or a scene file; with ``changes``: keys such as
-    ``"frames.last"`` or ``"effect[1].bulk"`` with other values, as scene files write them. InputError where a key is missing,
-    unknown or wrong; it states the file, the key, the value and the expected value.
+    """Read a ``case``: the name of a shipped case, a folder with a ``case.toml``, or a scene file; with ``changes``: keys such as
+    ``"frames.last"`` or ``"effect[1].bulk"`` with other values, as scene files write them. InputError if a key is missing,
+    unknown or wrong; the error states the file, the key, the value and the expected value.
     """
     arguments.check_changes(changes)
     path(case, "case")
@@ -42,13 +42,13 @@ def solve(
     progress: Progress | None = None,
     **settings: Any,
 ) -> Run:
-    """Solve a case, or read its stored run: a run is stored under a key of everything that determines it.
+    """Solve a case, or read its stored run; a run is stored under a key that depends on everything that determines it.
 
-    ``solver``: the name of one, such as ``"pbd"``, or your function ``solver(scene, out, **settings)``, which reads a folder that
+    ``solver``: its name, such as ``"pbd"``, or your function ``solver(scene, out, **settings)``, which reads a folder that
     :func:`export_case` writes and writes frames into another; without it the reference, with the settings of the case. ``settings``
     are those of the ``solver``, as scene files write them; by default those of the case for it, else those of Table 5.1. The
     run has ``positions`` (f, n, 3) [mm] of the surface's vertices by frame number, ``outcome`` (status, message, cost) and
-    ``folder``. Where physics fails, the status says so and the frames reached before are kept.
+    ``folder``. If the solution fails, the status states it, and the frames reached before are kept.
     """
     arguments.check_case(case)
     arguments.check_solver(solver, settings)
@@ -70,11 +70,11 @@ def _chosen(
 
 
 def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
-    """Read frames that another program wrote, ``positions`` (f, n, 3) [mm] of the vertices of the case's muscle in its order.
+    """Read frames that another program wrote, ``positions`` (f, n, 3) [mm] of the vertices of the case's muscle in the same order.
 
-    ``folder``: one with a mesh per frame, or a file of a sequence; ``candidate.toml`` in it may state name and unit. ``unit``:
-    that of length, by default that of ``candidate.toml``, else mm. InputError where a file cannot be read whole, or its vertices
-    or its first frame are not those of the case.
+    ``folder``: a folder with a mesh per frame, or a file of a sequence; ``candidate.toml`` in it may state name and unit. ``unit``:
+    the unit of length, by default that of ``candidate.toml``, else mm. InputError if a file cannot be read completely, or its
+    vertices or its first frame are not those of the case.
     """
     arguments.check_case(case)
     choice = recorded.choice(path(folder, "folder"), unit)
@@ -101,12 +101,12 @@ def error_bars(
     store: str | Path = STORE,
     progress: Progress | None = None,
 ) -> ErrorBars | BodyBars | None:
-    """Estimate the error of each statistic of a reference, from runs on larger tetrahedra and with finer contact; or that of a body
-    on cells of its shape, from a solution on smaller cells or with more unknowns in each.
+    """Estimate the error of each statistic of a reference, from runs on larger tetrahedra and with finer contact; or that of a
+    body, from a solution on smaller cells or with more unknowns in each cell.
 
     ``reference``: the result of :func:`solve` without a ``solver``, beside whose run bars are stored, or of :func:`solve_body`.
-    ``muscle``: the name of the one whose bars are wanted, of a case of several muscles; the runs are those of all.
-    Each statistic has a bar for each frame, in its unit; a body has bars of points, forces, moments and energy. None where the
+    ``muscle``: the name of the muscle whose bars are wanted, in a case of several; the runs solve all muscles.
+    Each statistic has a bar for each frame, in its unit; a body has bars of points, forces, moments and energy. None if the
     reference did not converge.
     """
     with reported(progress):
@@ -122,7 +122,7 @@ def error_bars(
 def compare(
     case: Case, reference: Run, candidates: Sequence[Run] = (), *, error_bars: ErrorBars | None = None
 ) -> Comparison:
-    """Measure candidates against the reference of a case, and judge its expectations.
+    """Measure candidates against the reference of a case, and judge the expectations of the case.
 
     A frame that a run did not reach is NaN, and never a pass. With ``error_bars`` of the reference, from :func:`error_bars`, a
     verdict that they leave in doubt is inconclusive. ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: ``values``
@@ -138,7 +138,7 @@ def compare(
 def export_case(case: Case, folder: str | Path, form: export.Format = "open") -> list[str]:
     """Write all that another program needs to solve a case into a new or empty ``folder``; return the names of the files.
 
-    ``form``: ``"open"``, PLY, VTU, MSH, VTK, CSV and JSON, lengths in mm; ``"febio"``: FEBio's input file too. InputError where
+    ``form``: ``"open"`` for PLY, VTU, MSH, VTK, CSV and JSON, in mm; ``"febio"`` for FEBio's input file too. InputError if
     ``folder`` is not empty, or FEBio lacks an effect.
     """
     arguments.check_case(case)
@@ -149,7 +149,7 @@ def export_case(case: Case, folder: str | Path, form: export.Format = "open") ->
 def export_runs(comparison: Comparison, folder: str | Path) -> list[str]:
     """Write the runs of a muscle for ParaView into a new or empty ``folder``; return the names of the files, or raise InputError.
 
-    ``runs.pvd`` opens all frames, with named blocks and arrays on them; the README.md among the files says what each array is.
+    ``runs.pvd`` opens all frames, with named blocks and arrays on them; the README.md among the files describes each array.
     Stress, pressure and det F are included if the reference was solved with ``store_state = true``.
     """
     arguments.check_comparison(comparison)
@@ -163,7 +163,7 @@ def write_report(comparison: Comparison, folder: str | Path) -> Path:
 
 
 def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any) -> Run:
-    """Solve a body of any shape, whose prescribed displacements may be functions of your own, with the reference, FEniCSx.
+    """Solve a body of any shape, whose prescribed displacements may be your own functions, with the reference, FEniCSx.
 
     ``settings`` are as under ``[reference]`` in a scene file: ``element``, ``first_step``, ``residual``, ... The run has
     ``states``, each with ``points`` (n, 3) [mm] of the nodes and ``forces`` (3,) [N] by name of the prescribed displacement, and

@@ -1,4 +1,4 @@
-"""Bodies that are bent and twisted: a block into a tube sector, a cylinder by a finite angle, a square bar by a small one."""
+"""Bent and twisted bodies: a block bent into a tube sector, a cylinder twisted by a finite and a square bar by a small angle."""
 
 from collections.abc import Callable
 from functools import partial
@@ -16,10 +16,10 @@ from fem_reference.runs.store import Frame
 from fem_reference.verification.parts import SLOW, clamped, control, find, mooney_rivlin, neo_hooke, sliding
 
 rivlin = find("rivlin")
-# [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. The true values are those of an incompressible material.
+# [MPa]; C1 and C2 make a Mooney-Rivlin law with the shear modulus MU. The true values are those of an incompressible material.
 MU, BULK = 0.01, 1e4
 C1, C2 = 0.003, 0.002
-# The bent block [mm], and the angle [rad] between its ends: bent, its curved faces have radii of 15.7 and 25.4 mm.
+# The block [mm], and the angle [rad] between its ends when it is bent; its curved faces then have radii of 15.7 and 25.4 mm.
 THICKNESS, LENGTH, WIDTH, ANGLE = 10.0, 20.0, 2.5, 1.0
 # Radius and height of the cylinder [mm], and its twist [rad/mm]: 0.5 rad from end to end, a shear of 0.5 at its lateral surface.
 RADIUS, TALL, TWIST = 10.0, 10.0, 0.05
@@ -37,7 +37,7 @@ def flexed(thickness: float, length: float, angle: float, points: Floats, frame:
 
 
 def bent(lab: Lab, n: int, reading: str, element: str, mu: float = MU, faces: tuple[str, ...] = ("z0", "z1")) -> float:
-    """A reading of the half y >= 0 of the block in 2n by 2n by 1 cells, whose lateral ``faces`` stay in plane; ``mu`` [MPa]."""
+    """A reading of the half y >= 0 of the block in 2n by 2n by 1 cells, whose lateral ``faces`` stay plane; ``mu`` [MPa]."""
     mesh = shapes.box((2 * n, 2 * n, 1), (THICKNESS, LENGTH / 2, WIDTH), ELEMENTS[element][0], 2)
     end = Prescribed("y1", "y1", (0, 1, 2), partial(flexed, THICKNESS, LENGTH, ANGLE))
     body = Body(mesh, neo_hooke(mu, BULK), (*sliding("y0"), end, *sliding(*faces)), (0.0, 1.0))
@@ -84,8 +84,8 @@ READINGS = {
 
 
 def twisted(lab: Lab, rings: int, end: str, element: str, material: tuple[Effect, ...], degree: int = 2) -> float:
-    """``moments`` [N mm] or ``forces`` [N] of the top about or along the axis of the cylinder, whose ends are turned by TWIST times
-    their height and fixed there; with ``degree`` 1 its cells are straight.
+    """The moment [N mm] about the axis of the cylinder or the force [N] along it on its top, as ``end`` names. Both ends are turned
+    by TWIST times their height and fixed there; with ``degree`` 1 its cells are straight.
     """
     mesh = shapes.cylinder(RADIUS, TALL, rings, rings, ELEMENTS[element][0], degree)
     turn = Turn((0.0, 0.0, 1.0), TWIST, per_length=True)
@@ -95,8 +95,8 @@ def twisted(lab: Lab, rings: int, end: str, element: str, material: tuple[Effect
 
 
 def square_bar(lab: Lab, cells: int, element: str, turned: tuple[int, ...]) -> float:
-    """Torque per twist [N mm2]. A quarter of the bar, as small displacements are antisymmetric about the planes of its axis; its
-    ends are ``turned`` along these axes.
+    """The torque per twist [N mm2], from a quarter of the bar, as small displacements are antisymmetric about planes through its
+    axis. The displacements of its ends are prescribed along the axes ``turned``.
     """
     half = SIDE / 2
     mesh = shapes.box((cells, cells, 1), (half, half, SHORT), ELEMENTS[element][0])
@@ -129,7 +129,7 @@ def flexure(
         truth=READINGS[reading].truth,
         within=error[0],
         relative=True,
-        because=f"discretisation error {error[1]} cells through the thickness; K/mu = 1e6 instead of incompressibility adds 1e-6",
+        because=f"discretisation error {error[1]} cells through the thickness; the finite K/mu = 1e6 adds 1e-6",
         kind="closed form",
         source="Rivlin 1949, doi 10.1098/rspa.1949.0004; validation/rivlin.py Flexure",
         **stated,
@@ -144,7 +144,7 @@ TWISTED = {
 MOMENT = ("moments", "the moment", "N mm", "moment")
 PULL = ("forces", "the axial force that keeps its length (Poynting effect)", "N", "axial_force")
 STRAIGHT = control("straight cells, with flat facets on the surface", degree=1)
-SAME_MOMENT = "material of the same shear modulus, which needs the same moment"
+SAME_MOMENT = "material with the same shear modulus, which needs the same moment"
 MOONEY = control(f"Mooney-Rivlin {SAME_MOMENT}", material=MOONEY_RIVLIN)
 NEO = control(f"neo-Hookean {SAME_MOMENT}", material=NEO_HOOKE)
 OTHER_C2 = control("c2 is 1 % too large", material=mooney_rivlin(C1, 1.01 * C2, BULK))
@@ -168,7 +168,7 @@ def torsion(
         truth=getattr(true, truth),
         within=error[0],
         relative=True,
-        because=f"discretisation error of order 4, {error[1]} cells along the radius; K/mu = 1e6, not incompressible, adds 1e-6",
+        because=f"discretisation error of order 4, {error[1]} cells along the radius; the finite K/mu = 1e6 adds 1e-6",
         kind="closed form",
         source="Rivlin 1949, doi 10.1098/rsta.1949.0009; validation/rivlin.py Torsion",
         **wrong,
@@ -192,7 +192,7 @@ SQUARE = partial(
 ENTRIES: tuple[Entry, ...] = (
     flexure("moment_tetrahedra", "moment", "P2/P1", FREE, (5e-5, "of order 4, 1e-5 with 8")),
     flexure("moment_hexahedra", "moment", "Q2/Q1", STIFF, (1e-5, "of order 4, 3e-6 with 6")),
-    flexure("inner_radius", "inner radius", "Q2/Q1", FREE, (1e-4, "that leaves 3e-5 with 6"), refinement=MIXED),
+    flexure("inner_radius", "inner radius", "Q2/Q1", FREE, (1e-4, "of 3e-5 with 6"), refinement=MIXED),
     flexure("thickness", "thickness", "Q2/Q1", FREE, (3e-5, "of order 4 or more, 7e-6 with 6")),
     torsion("moment_tetrahedra", "neo-Hookean", MOMENT, STRAIGHT, (5e-4, "8e-5 with 8"), element="P2/P1"),
     torsion("moment_hexahedra", "neo-Hookean", MOMENT, STRAIGHT, (1e-4, "1.6e-5 with 6"), element="Q2/Q1"),

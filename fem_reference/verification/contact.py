@@ -1,4 +1,4 @@
-"""Contact of deformable with rigid bodies: a plate on a block, and a ball on a large body (Hertz)."""
+"""Contact between deformable and rigid bodies: a plate on a block, and a ball on a large body (Hertz)."""
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
@@ -17,7 +17,7 @@ from fem_reference.verification.parts import SLOW, SYMMETRY, clamped, control, f
 
 MU = 0.01  # [MPa]
 PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL = 10.0, 1.0, 0.5  # [MPa], [MPa/mm], [mm]; the cube has sides of 1 mm
-# Of the ball [mm], and the bulk modulus of the body [MPa]: the radius of the contact is 1 mm.
+# Radius and approach of the ball [mm], and the bulk modulus of the body [MPa]; the contact radius is 1 mm.
 RADIUS, APPROACH, BULK = 10.0, 0.1, 10.0
 BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2  # [MPa/mm]; radii of the body and of its finely meshed core [mm]
 
@@ -28,7 +28,7 @@ def sliding_by(path: float) -> Callable[[float], Floats]:
 
 
 def plate(lab: Lab, element: str, stiffness: float) -> Finding:
-    """The force [N] of a smooth plate that is moved down on an eighth of a cube of 2 mm."""
+    """The force [N] of a smooth plate that is moved down onto an eighth of a cube of 2 mm."""
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
     law = ContactLaw("z1", stiffness, 0.01)
     above = ContactBone("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), sliding_by(-PLATE_TRAVEL))
@@ -39,7 +39,7 @@ def plate(lab: Lab, element: str, stiffness: float) -> Finding:
 
 def in_series(bulk: float, stiffness: float, travel: float) -> float:
     """The force [N] of a block of 1 mm with a ``bulk`` modulus [MPa] in series with a spring of a ``stiffness`` [MPa/mm], whose end
-    is moved down by a ``travel`` [mm]: contact is that spring beyond its smoothing.
+    is moved down by a ``travel`` [mm]; beyond its smoothing, contact acts as this spring.
     """
     force = partial(find("loads").squeeze_force, MU, bulk, area=1.0)
 
@@ -59,8 +59,8 @@ def pressed(lab: Lab, n: int, radius: float) -> Frame:
 
 
 def ball_readings(name: str) -> dict[str, Callable[[Frame], float]]:
-    """Readings of the force ``name`` on a quarter: that on the whole ball [N], and the contact radius [mm] from the lever arm
-    of the force: the resultant of Hertz's pressure on a quarter acts at 3/8 of that radius.
+    """Readings of the force ``name`` on a quarter: the force on the whole ball [N], and the contact radius [mm] from its lever
+    arm, as the resultant of Hertz's pressure on a quarter acts at 3/8 of this radius.
     """
     return {
         "force": lambda state: 4 * float(state.forces[name][2]),
@@ -68,7 +68,7 @@ def ball_readings(name: str) -> dict[str, Callable[[Frame], float]]:
     }
 
 
-# Also the greatest pressure [MPa].
+# The readings of a ball, and the greatest pressure [MPa].
 READINGS: dict[str, Callable[[Frame], float]] = {
     **ball_readings("ball"),
     "peak_pressure": lambda state: float(state.scalars["contact_pressure"]),
@@ -86,7 +86,7 @@ YOUNG, POISSON = 9 * BULK * MU / (3 * BULK + MU), (3 * BULK - 2 * MU) / (2 * (3 
 
 
 def known_ball(name: str) -> float:
-    """The closed form for a rigid ball on a body of these moduli."""
+    """The closed form for a rigid ball on a body with these moduli."""
     hertz = find("hertz")
     known = hertz.rigid_sphere(RADIUS, YOUNG, POISSON, hertz.force_at(RADIUS, YOUNG, POISSON, APPROACH))
     return float(getattr(known, name))
@@ -138,7 +138,7 @@ ENTRIES = (
             **control("a plate 1 % stiffer", stiffness=1.01 * PLATE_STIFFNESS),
             truth=partial(in_series, PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL),
             within=1e-9,
-            because="the state is homogeneous and the plate a spring: only the Newton residual of 1e-12 N remains",
+            because="the state is homogeneous and the plate acts as a spring: only the Newton residual of 1e-12 N remains",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
         )
         for element in ("P2/P1", "Q2/Q1", "Q1/P0")

@@ -20,7 +20,7 @@ from fem_reference.verification.parts import SLOW, clamped, control, find, neare
 cook = find("cook")
 THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
 SMALL = 1e-5  # the share of the load at which the response is linear: second-order terms are about 1e-5 of it
-RESIDUAL = 1e-5  # at the whole load of about 100 N [N, mm3]
+RESIDUAL = 1e-5  # at the full load of about 100 N [N, mm3]
 LOCKED = 0.5  # the panel locks if its tip reaches less than this share of the true displacement
 
 
@@ -74,9 +74,9 @@ MEMBRANES = {
     "COMPRESSIBLE": "at small strain, Poisson's ratio 1/3",
     "NEARLY_INCOMPRESSIBLE": "at small strain, Poisson's ratio 0.4999",
     "FINITE_QUARTER": "at finite strain, a quarter of the load",
-    "FINITE": "at finite strain, the whole load",
+    "FINITE": "at finite strain, the full load",
 }
-# By element: the cells in words, and the numbers of them. The singular clamped corners limit quadratic cells to order 1 or a little
+# By element: the cells in words, and their numbers. The singular clamped corners limit quadratic cells to order 1 or a little
 # more; linear cells, whose error is far larger, converge at order 2.
 CELLS = {
     "P1": ("linear tetrahedra", (16, 32, 64)),
@@ -101,7 +101,7 @@ def tip_entry(
 ) -> Entry:
     """The tip of a ``panel`` made of an ``element``; ``stiff``: the tolerance, and the excess stiffness in words."""
     words, counts = CELLS[element]
-    by, order = ("by linear cells", 2) if "1" in element[:2] else ("limited by the singular clamped corners", 1)
+    by, order = ("of linear cells", 2) if "1" in element[:2] else ("limited by the singular clamped corners", 1)
     stated = {"refinement": Refinement(counts, HEIGHT, order)} | wrong | more
     return MEMBRANE(
         name=f"cook_{name}",
@@ -139,13 +139,13 @@ ENTRIES: tuple[Entry, ...] = (
         **control("quadratic tetrahedra with a pressure", element="P2/P1"),
         truth=LOCKED / 2,
         within=LOCKED / 2,
-        because="less than half of the displacement is called locked: any ratio from 0 to 0.5 passes",
+        because="the element counts as locked below half of the displacement: any ratio from 0 to 0.5 passes",
         kind="property",
         source="true displacement of the tip: " + SOURCE,
     ),
     MEMBRANE(
         name="cook_taylor_hood",
-        title="Taylor-Hood tetrahedra do not lock on the mesh on which linear ones do: tip displacement over its true value",
+        title="Taylor-Hood tetrahedra do not lock on the mesh on which linear ones lock: tip displacement over its true value",
         unit="",
         measure=ratio,
         given={**NEARLY, "n": 8, "element": "P2/P1"},

@@ -15,7 +15,7 @@ from fem_reference.verification.loads import FREE_FALL, MUSCLE, weight
 from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, control, find, frames, neo_hooke, sliding
 
 damping, viscosity = find("damping"), find("viscosity")
-SECONDS = 0.1  # from one frame to the next, with a drag
+SECONDS = 0.1  # from one frame to the next, in entries with a drag
 DRAG = 1e-4  # of a block that falls through a viscous medium [MPa s/mm2]
 # A bar in a frictionless box: its length [mm], bulk modulus [MPa] and the rate at which it creeps back [1/s].
 LENGTH, SOFT, RATE = 10.0, 5 * MU, 5.0
@@ -23,7 +23,7 @@ CREEP = (SOFT + 4 / 3 * MU) * (np.pi / (2 * LENGTH)) ** 2 / RATE  # [MPa s/mm2]
 LIGHT = 1e-6  # a weight [N/mm3], for a stretch of 1e-4
 ETA, VISCOUS_SECONDS = 0.02, 1.5  # viscosity of the blocks [MPa s], and time from one frame to the next [s]
 BULK = 1e6 * MU  # so high that the closed form for incompressible material holds to 1e-6
-STRESS = 3e-4 * MU  # a small weight on the top of a block until frame 1, which then creeps back
+STRESS = 3e-4 * MU  # a small load on the top of a block, which creeps back after its removal
 # Loads that are removed by frame 2.
 UP_AND_GONE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}, {"frame": 2.0, "amount": 0.0}]
 
@@ -54,7 +54,7 @@ def relaxation_rate(solved: Run, numbers: tuple[int, int], seconds: float) -> fl
 
 
 def bar_creep(lab: Lab, n: int, coefficient: float) -> float:
-    """The rate [1/s] at which the bar creeps back from frame 4 to 6 when its weight is gone, in n load steps a frame."""
+    """The rate [1/s] at which the bar creeps back from frame 4 to 6, after its weight is removed, in n load steps a frame."""
     mesh = shapes.box((1, 1, 4), (2.0, 2.0, LENGTH), "hexahedron")
     pull = f"0, 0, {-LIGHT / MUSCLE} mm/s^2"
     gone = make("gravity", density=f"{MUSCLE} tonne/mm^3", acceleration=pull, ramp=UP_AND_GONE)
@@ -65,7 +65,7 @@ def bar_creep(lab: Lab, n: int, coefficient: float) -> float:
 
 
 def block_creep(lab: Lab, n: int, eta: float) -> float:
-    """The rate [1/s] at which the block creeps back from frame 2 to 3 when its weight is gone, in n load steps a frame."""
+    """The rate [1/s] at which the block creeps back from frame 2 to 3, after its load is removed, in n load steps a frame."""
     mesh = shapes.box((1, 1, 1), (1.0, 2.0, 3.0), "tetrahedron")
     gone = make("traction", on="z1", force=f"0, 0, {-STRESS} MPa", ramp=UP_AND_GONE)
     acting = (*neo_hooke(MU, BULK), gone, make("viscosity", eta=eta))
@@ -76,7 +76,7 @@ def block_creep(lab: Lab, n: int, eta: float) -> float:
 
 def halved(counts: tuple[int, ...], seconds: float, name: str) -> Refinement:
     """Load steps of ``seconds / count`` for the quantity ``name``, which implicit Euler integrates."""
-    note = f"{name} by implicit Euler; sizes are seconds of a load step, the value is extrapolated from the last two"
+    note = f"{name} by implicit Euler; sizes are load steps in seconds; the value is extrapolated from the last two"
     return Refinement(counts, seconds, order=1, extrapolated=True, note=note)
 
 
@@ -125,8 +125,8 @@ ENTRIES: tuple[Entry, ...] = (
         unit="N",
         measure=force,
         truth=lambda: viscosity.squeeze_force(MU, ETA, 0.5, -0.5 / VISCOUS_SECONDS, 1.0),
-        because="The last load step shortens the block by the share x of its height, 1/64 with the longer steps. By hand, the "
-        "viscous part (0.7 of the force) errs by -2 x + 16/3 x^2; extrapolation leaves 0.7 * 8/3 x^2 = 4.6e-4.",
+        because="The last load step shortens the block by the share x of its height, 1/64 with the longer steps. The "
+        "viscous part (0.7 of the force) errs by -2 x + 16/3 x^2 (by hand); extrapolation leaves 0.7 * 8/3 x^2 = 4.6e-4.",
         source="validation/viscosity.py, squeeze_force",
         refinement=halved((32, 64, 128), VISCOUS_SECONDS, "force"),
     ),

@@ -32,7 +32,7 @@ PINNED = {
 
 
 def measured(_: Lab, quantity: Quantity, material: Material) -> Finding:
-    """A quantity of a material, with the reason why the shipped one cannot reach it."""
+    """A quantity of a material, with the reason why the shipped material cannot reach the measured value."""
     return Finding(quantity.of(material), note=f"Known limit: {quantity.limit}" if quantity.limit else "")
 
 
@@ -88,7 +88,7 @@ ORDERS = Quantity(
     truth=1.0,
     within=0.5,
     because="The answer is yes (1: both differences are at least 1 %) or no (0).",
-    limit="A law of fibres that pull in tension only reproduces neither.",
+    limit="A law whose fibres resist tension alone reproduces neither.",
     is_order=True,
 )
 

@@ -46,7 +46,7 @@ def tension(activation: float = 1.0) -> Material:
 
 
 def taut(material: Material, stretch: float) -> Material:
-    """``material`` whose fibres are stretched at rest by ``stretch``."""
+    """``material`` with fibres that are stretched at rest by ``stretch``."""
     acting = make("prestretch", stretch=stretch, ramp=ramp())
     return Material((*material.effects, acting), laws.Prestretched(material.law, stretch))
 

@@ -19,7 +19,7 @@ from fem_reference.verification.parts import NO_GRADIENT, clamped, control, neo_
 
 FRICTION, MU, BULK = 0.3, 0.01, 0.1  # coefficient, and moduli [MPa]
 WEIGHT, STIFFNESS, HEIGHT = 1e-4, 0.01, 0.5  # pressure under the block [MPa], contact stiffness [MPa/mm], height [mm]
-NEAR = (0.9, 0.99, 0.999, 0.9999, 1.0002, 1.001)  # tangents of the requested angles, divided by the friction
+NEAR = (0.9, 0.99, 0.999, 0.9999, 1.0002, 1.001)  # tangents of the requested angles, in coefficients of friction
 LAW = ContactLaw("z0", STIFFNESS, 0.01, friction=FRICTION)
 
 
@@ -83,7 +83,7 @@ ENTRIES = (
         **control("friction 1 % greater", friction=1.01 * FRICTION),
         within=2e-3,
         because="under a pressure of a thousandth of the moduli the faces tilt by about 0.001 rad, and with them their normals",
-        source="Coulomb: a drag of the friction times the normal force",
+        source="Coulomb: the drag is the friction times the normal force",
     ),
     DRAG(
         name="incline",
@@ -101,6 +101,6 @@ ENTRIES = (
         **control("friction 1 % greater", friction=1.01 * FRICTION),
         within=1e-7,
         because="each sliding point is at its Coulomb limit up to rounding: the residual of 1e-12 N remains, at forces of 1e-4 N",
-        source="Coulomb: a drag of the friction times the normal force",
+        source="Coulomb: the drag is the friction times the normal force",
     ),
 )

@@ -1,4 +1,4 @@
-"""The cardiac mechanics benchmark (Land et al. 2015): a bending beam, a ventricle that is inflated, one that contracts."""
+"""The cardiac mechanics benchmark (Land et al. 2015): a bending beam, an inflated ventricle and a contracting one."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,11 +15,11 @@ from fem_reference.problems.paths import Along
 from fem_reference.verification.parts import SLOW, clamped, control, find, nearest, ramp, resistance, sliding
 
 land = find("land")
-BULK = 100.0  # [MPa], some 1e4 times the stresses: J is 1 within 1e-4 on average
+BULK = 100.0  # [MPa], about 1e4 times the stresses: J is 1 within 1e-4 on average
 RESIDUAL = 1e-10  # [N, mm3]; the beam carries 2e-5 N
 X = (1.0, 0.0, 0.0)
 APEX = 0.6  # length of the cells at the apex of the contracting ventricle, relative to that in the uniform mesh
-AROUND = 7.85  # an eighth of the outer circumference of the ventricle at its widest [mm]; the cell sizes are this divided by n
+AROUND = 7.85  # an eighth of the outer circumference of the ventricle at its widest [mm]; cell sizes are this length divided by n
 ENDO, EPI = (0.0, 0.0, -17.0), (0.0, 0.0, -20.0)
 Point = tuple[float, float, float]
 
@@ -78,8 +78,8 @@ def height(lab: Lab, n: int, body: str, point: Point, **heart: Any) -> float:
 
 
 def _crowded(mesh: Cells) -> Cells:
-    """The ventricle ``mesh``, its cells ``APEX`` times as long at the apex: their angle w from it, 1 at the base, becomes
-    ``w (a + (1 - a) w^2)``. Fibres meet at the apex, and the stress has a logarithmic pole along the axis.
+    """The ventricle ``mesh`` with cells ``APEX`` times as long at the apex: their angle w from it, 1 at the base, becomes
+    ``w (a + (1 - a) w^2)``. Fibres meet at the apex, and the stress has a logarithmic singularity along the axis.
     """
     points = mesh.points
     depth = land.depth(points)
@@ -138,7 +138,7 @@ ENTRIES: tuple[Entry, ...] = (
             **control("half the active tension", active=0.5),
             truth=land.ACTIVE_APICES[place],
             within=0.005,
-            because=f"0.5 %: {BOUND}; {FINE if place else 'the discretisation error is 1 % (coarse) and some 0.2 % (fine)'}",
+            because=f"0.5 %: {BOUND}; {FINE if place else 'the discretisation error is 1 % (coarse) and about 0.2 % (fine)'}",
         )
         for where, (place, point) in APICES.items()
     ),

@@ -38,17 +38,17 @@ class Material:
 
 
 def neo_hooke(mu: float) -> Material:
-    """A neo-Hookean law of the shear modulus ``mu`` [MPa]."""
+    """A neo-Hookean law with the shear modulus ``mu`` [MPa]."""
     return Material((make("neo_hooke", mu=f"{mu} MPa"),), laws.neo_hooke(mu))
 
 
 def mooney_rivlin(c1: float, c2: float) -> Material:
-    """A Mooney-Rivlin law of ``c1`` and ``c2`` [MPa]."""
+    """A Mooney-Rivlin law with ``c1`` and ``c2`` [MPa]."""
     return Material((make("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa"),), laws.MooneyRivlin(c1, c2))
 
 
 def guccione(c: float) -> Material:
-    """Guccione's law of ``c`` [MPa], with the exponents of Land et al. 2015, problem 1."""
+    """Guccione's law with ``c`` [MPa] and the exponents of Land et al. 2015, problem 1."""
     return Material((make("guccione", c=f"{c} MPa", bf=8.0, bt=2.0, bfs=4.0),), laws.Guccione(c, 8.0, 2.0, 4.0))
 
 
@@ -87,7 +87,7 @@ class Specimen:
     loads: tuple[Effect, ...] = ()
 
     def body(self) -> Body:
-        """The block, two cells along each side."""
+        """The block, with two cells along each side."""
         acting = (*self.material.effects, resistance(self.element, self.bulk), *self.loads)
         mesh = shapes.box((2, 2, 2), SIZE, ELEMENTS[self.element][0])
         return Body(mesh, acting, MODES[self.mode][0](self.amount), (0, 1), Along(self.fibre))
@@ -124,7 +124,7 @@ BLOCK = partial(
     Entry,
     within=1e-11,
     relative=True,
-    because="The element represents the exact solution: rounding and the residual of 1e-13 N that ends Newton's method remain.",
+    because="The element represents the exact solution: only rounding and Newton's residual of 1e-13 N remain.",
     kind="closed form",
     source="validation/homogeneous.py: equilibrium by root finding (Ogden 1984, ch. 4.3)",
 )
@@ -156,7 +156,7 @@ def stretch_entry(
 GROUP = "homogeneous"
 NEO, MOONEY, HEART = neo_hooke(MU), mooney_rivlin(0.003, 0.002), guccione(0.002)
 STIFFER = "Shear modulus 1 % too high.", neo_hooke(1.01 * MU)
-OTHER_LAW = "A neo-Hookean law of the same shear modulus.", NEO
+OTHER_LAW = "A neo-Hookean law with the same shear modulus.", NEO
 STIFFER_MOONEY = "Both moduli 1 % too high.", mooney_rivlin(1.01 * 0.003, 1.01 * 0.002)
 AMOUNTS = {
     "uniaxial": (1.6, "stretched along one axis, free laterally"),

@@ -43,7 +43,7 @@ def fallen(lab: Lab, factor: float) -> float:
 
 
 def bar(acting: tuple[Effect, ...], prescribed: tuple[Prescribed, ...], count: int, seconds: float) -> Body:
-    """A bar that cannot widen, one end fixed along its axis, over ``count`` frames that last ``seconds`` in total."""
+    """A bar that cannot widen, with one end fixed along its axis, over ``count`` frames that last ``seconds`` in total."""
     mesh = shapes.box((8, 1, 1), (LENGTH, 1.0, 1.0), "tetrahedron")
     fixed = (*sliding("x0", "y0", "y1", "z0", "z1"), *prescribed)
     return Body(mesh, (*neo_hooke(MU, BULK, "P2"), *acting), fixed, frames(count, count), interval=seconds / count)
@@ -66,7 +66,7 @@ def frequency(lab: Lab, steps: int, factor: float) -> float:
 
 def departure(lab: Lab, spectral_radius: float) -> Finding:
     """The greatest change of the total (elastic, kinetic and potential) energy over the greatest kinetic energy, of a block clamped
-    at one side that swings under its own weight, applied at once.
+    at one side that swings under its own weight, which is applied at once.
     """
     mesh = shapes.box((4, 1, 1), (4.0, 1.0, 1.0), "tetrahedron")
     acting = (*neo_hooke(MU, 100 * MU), mass(1.0, spectral_radius), weight(2, -6e4))
@@ -88,7 +88,7 @@ PULL = Affine(NO_GRADIENT, (WAY, 0.0, 0.0), tuple((float(i), float(SMOOTH(i / FR
 
 
 def more(lab: Lab, periods: float, factor: float) -> float:
-    """The force [N] due to inertia after a quarter of a pull by 1e-4 of the length that takes ``periods`` of the first mode."""
+    """The force [N] due to inertia after a quarter of a pull by 1e-4 of the length, which takes ``periods`` of the first mode."""
     pulled = (Prescribed("x1", "x1", (0,), PULL),)
     bodies = [bar(acting, pulled, FRAMES, periods * PERIOD) for acting in ((), (mass(factor),))]
     without, moving = (lab.solve(body, "P2", **STEP, residual=1e-14).states[16].forces["x1"][0] for body in bodies)
@@ -96,7 +96,7 @@ def more(lab: Lab, periods: float, factor: float) -> float:
 
 
 def slow(lab: Lab, factor: float) -> Finding:
-    """Inertia force over its limit for slow motion, in pulls each twice as long as the last: an error of order 2 in the speed."""
+    """The inertia force over its limit for slow motion, in pulls each twice as long as the last; its error is of order speed^2."""
     ladder = tuple((1 / periods, more(lab, periods, factor)) for periods in (4.0, 8.0, 16.0))
     acceleration = WAY * float(SMOOTH.deriv(2)(0.25)) / (16.0 * PERIOD) ** 2
     known = inertia.pull_of_inertia(DENSITY, LENGTH, 1.0, acceleration)
@@ -112,7 +112,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="mm",
         measure=fallen,
         given={"factor": 1.0},
-        **control("The inertial mass is 1 % larger than the heavy mass.", factor=1.01),
+        **control("The inertial mass is 1 % larger than the gravitational mass.", factor=1.01),
         truth=lambda: inertia.fall(G, FALLING),
         within=1e-9,
         relative=True,
@@ -129,7 +129,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=OMEGA,
         within=1e-3,
         relative=True,
-        because="With a phase of x = 2 pi / 80 in a time step the frequency is too low by x^2 / 12 = 5.1e-4.",
+        because="With a phase of x = 2 pi / 80 in a time step, the frequency is too low by x^2 / 12 = 5.1e-4.",
         source="validation/inertia.py, first_frequency",
         refinement=Refinement((20, 40, 80), PERIOD, order=2, note="sizes are time steps in seconds"),
     ),
@@ -140,7 +140,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="",
         measure=departure,
         given={"spectral_radius": 0.9},
-        **control("Time integration that annihilates the shortest waves.", spectral_radius=0.0),
+        **control("A time integration that removes the shortest waves.", spectral_radius=0.0),
         truth=0.0,
         within=0.01,
         because="Nothing dissipates energy; a drift of 1 % in ten periods of 60 time steps is allowed.",
@@ -149,7 +149,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     MOVING(
         name="slow_pull",
-        title="Bar that is pulled more and more slowly: what inertia adds to the force, divided by its limit for slow motion",
+        title="Bar that is pulled more and more slowly: the inertia force, divided by its limit for slow motion",
         unit="",
         measure=slow,
         given={"factor": 1.0},
@@ -158,7 +158,7 @@ ENTRIES: tuple[Entry, ...] = (
         within=0.02,
         relative=True,
         because="The next term of the expansion is of the order of (period / duration of the pull)^2: below 1 %; time steps of a "
-        "sixty-fourth of the pull add up to 1 % too.",
+        "sixty-fourth of the pull also add up to 1 %.",
         source="validation/inertia.py, pull_of_inertia",
     ),
 )

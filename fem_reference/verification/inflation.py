@@ -1,6 +1,6 @@
 """Inflation of hollow bodies: a sphere, past its limit point (the largest pressure), and a tube.
 
-Where the motion of the inner face is prescribed, the pressure is the derivative of the energy with respect to the enclosed volume,
+If the motion of the inner face is prescribed, the pressure is the derivative of the energy with respect to the enclosed volume,
 as the energy grows by the work of the pressure. A polynomial interpolates the energy at a few stretches of the inner face.
 """
 
@@ -20,10 +20,10 @@ from fem_reference.problems.paths import radially
 from fem_reference.runs.store import Run
 from fem_reference.verification.parts import SLOW, SYMMETRY, clamped, control, find, mooney_rivlin, neo_hooke, ramp
 
-# [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. Pressures are proportional to the moduli.
+# [MPa]; C1 and C2 make a Mooney-Rivlin law with the shear modulus MU. Pressures are proportional to the moduli.
 MU, BULK = 1.0, 1e4
 C1, C2 = 0.3, 0.2
-NEARLY = 1e6  # [MPa], the bulk modulus where the closed form is for incompressible material
+NEARLY = 1e6  # [MPa], the bulk modulus if the closed form is for incompressible material
 INNER, OUTER, LENGTH = 10.0, 20.0, 5.0  # radii of sphere and tube, length of the tube [mm]
 STRETCH, BEYOND = 1.5, 2.2  # a / A of the inner face; the pressure of the sphere is largest at 1.83
 PRESSED = 0.7  # [MPa]; the limit pressure of the sphere is 0.82
@@ -51,7 +51,7 @@ def slope(solved: Run) -> Chebyshev:
 
 
 def blown(lab: Lab, n: int, reading: Reading, element: str, material: Material, degree: int = 2) -> float:
-    """A ``reading`` of an octant of the sphere in 3 n^2 by 2 n cells, straight ones with ``degree`` 1; its inner face, which is
+    """A ``reading`` of an octant of the sphere in 3 n^2 by 2 n cells, straight with ``degree`` 1; its inner face, which is
     moved out, encloses ``pi a^3 / 6``.
     """
     largest, read = reading
@@ -70,7 +70,7 @@ def top(pressures: Pressures) -> float:
 
 
 def pressed(lab: Lab, n: int, mu: float) -> float:
-    """The mean stretch of the sphere's inner face, over its nodes, under a fluid of the pressure PRESSED in it."""
+    """The mean stretch of the sphere's inner face, over its nodes, under a fluid with the pressure PRESSED inside."""
     mesh = shapes.sphere_octant(INNER, OUTER, n, 2 * n, "tetrahedron", 2)
     fluid = make("pressure", on="inner", pressure=f"{PRESSED} MPa", ramp=ramp())
     body = Body(mesh, (*neo_hooke(mu, BULK), fluid), SYMMETRY, (0.0, 1.0))
@@ -99,7 +99,7 @@ def tube_force(lab: Lab, n: int, **given: Any) -> float:
 
 
 def sheathed(lab: Lab, n: int, thickness: float, element: str) -> float:
-    """The mean stretch of the inner face of a soft sphere with a membrane of a ``thickness`` [mm] on it, under pressure."""
+    """The mean stretch of the inner face of a soft sphere with a membrane of ``thickness`` [mm] on it, under pressure."""
     mesh = shapes.sphere_octant(INNER, OUTER, n, n, ELEMENTS[element][0], 2)
     membrane = make("membrane", on="inner", thickness=thickness, mu=MU)
     fluid = make("pressure", on="inner", pressure=SHEATHED, ramp=ramp())
@@ -124,7 +124,7 @@ TRUE_LAW, TRUE_SPHERE = laws.neo_hooke(MU), find("rivlin").Sphere(MU, INNER, OUT
 
 
 def true_pressure(law: object, stretch: float = STRETCH) -> float:
-    """The pressure in the sphere [MPa], of a law of ``validation/laws.py``."""
+    """The pressure in the sphere [MPa] with a law of ``validation/laws.py``."""
     return float(radial.sphere_pressure(law, BULK, (INNER, OUTER), stretch))
 
 
@@ -136,7 +136,7 @@ def true_tube(which: int) -> float:
 NEO_HOOKE, MOONEY_RIVLIN = neo_hooke(MU, BULK), mooney_rivlin(C1, C2, BULK)
 NEARLY_INCOMPRESSIBLE = neo_hooke(MU, NEARLY)
 STRAIGHT = control("straight cells, with flat facets on the surfaces", degree=1)
-OTHER_LAW = "Mooney-Rivlin material of the same shear modulus, whose pressure keeps rising"
+OTHER_LAW = "Mooney-Rivlin material with the same shear modulus, whose pressure keeps rising"
 RISING = control(OTHER_LAW, material=MOONEY_RIVLIN)
 INFLATED = partial(Entry, group="inflation", relative=True, kind="closed form")
 FINITE = partial(INFLATED, source="Ogden 1984, ch. 5.3, with the finite bulk modulus; validation/radial.py")
@@ -177,7 +177,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="MPa",
         measure=blown,
         given={"reading": AT_STRETCH, "n": 2, "element": "Q2/Q1", "material": MOONEY_RIVLIN},
-        **control("neo-Hookean material of the same shear modulus", material=NEO_HOOKE),
+        **control("neo-Hookean material with the same shear modulus", material=NEO_HOOKE),
         truth=lambda: true_pressure(laws.MooneyRivlin(C1, C2)),
         within=4e-4,
         because="discretisation error of order 4, 1e-4 with 4 cells through the wall (Q2/Q1)",
@@ -247,7 +247,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="MPa",
         measure=tube_pressure,
         given={"element": "Q2/Q1"},
-        **control("one end of the tube is free to move along it", ends=("bottom",)),
+        **control("one end of the tube is free to move along the axis", ends=("bottom",)),
         truth=lambda: true_tube(0),
         within=5e-5,
         because="discretisation error of order 4, 1.1e-5 with 6 cells through the wall (Q2/Q1)",

@@ -20,7 +20,7 @@ class FemLab:
         self.session = session
 
     def solve(self, body: Body, element: str, **settings: Any) -> Run:
-        """The states of ``body`` as the reference, FEniCSx, finds them within a time limit; RuntimeError if it is ended."""
+        """The states of ``body`` as the reference, FEniCSx, finds them within a time limit; RuntimeError if it ended early."""
         limited = {"time_limit": _TIME_LIMIT} | settings
         solved = self.session.solve(body, fenicsx.BodySettings(element=element, **limited))
         if solved.outcome.status in ("crashed", "timed out", "stalled"):
@@ -34,6 +34,6 @@ class FemLab:
 
 @contextmanager
 def lab() -> Iterator[FemLab]:
-    """A lab, whose process ends with the context. MissingSoftware where FEniCSx is not installed."""
+    """A lab, whose process ends with the context. MissingSoftware if FEniCSx is not installed."""
     with fenicsx.session() as session:
         yield FemLab(session)

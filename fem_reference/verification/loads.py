@@ -78,7 +78,7 @@ def shrunk(lab: Lab, pressure: float) -> float:
 
 
 def left_over(lab: Lab, faces: tuple[str, ...]) -> float:
-    """The sum of the forces [N] on both ends of a block, its top tilted by 0.3 rad, in a fluid that wets ``faces``."""
+    """The sum of the forces [N] on both ends of a block, whose top is tilted by 0.3 rad, in a fluid that wets ``faces``."""
     ends = (*parts.clamped("z0"), Prescribed("z1", "z1", (0, 1, 2), TILT))
     forces = loaded(lab, faces, pressed(2 * MU), ends).last.forces
     return float(np.linalg.norm(forces["z0"] + forces["z1"]))
@@ -126,7 +126,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     LOAD(
         name="pressed_volume",
-        title="Block in a fluid whose pressure is a tenth of its bulk modulus: volume over that at rest",
+        title="Block in a fluid whose pressure is a tenth of the block's bulk modulus: volume over rest volume",
         unit="1",
         measure=shrunk,
         given={"pressure": FLUID},
@@ -141,7 +141,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     LOAD(
         name="pressure_all_round",
-        title="Tilted block in a fluid that presses all round: the sum of the forces on both ends",
+        title="Tilted block in a fluid that presses on all sides: the sum of the forces on both ends",
         unit="N",
         measure=left_over,
         given={"faces": parts.SURFACE},

@@ -1,7 +1,7 @@
 """Idealised muscles compared with measured ones: a vastus lateralis with its aponeurosis, and a ball on a tibialis anterior.
 
-The material is the shipped one, chosen from other sources and never fitted to these. Shapes are idealised, and their sizes are
-from memory or assumed, so that no entry validates the model. The measurements of the publications are in
+The material is the shipped one, chosen from other sources and never fitted to these measurements. Shapes are idealised, and
+their sizes are from memory or assumed, so no entry validates the model. The measurements of the publications are in
 ``validation/experiments``.
 """
 
@@ -45,7 +45,7 @@ _MU, _ALPHA = find("bosboom_2001", "ogden_mu", ""), find("bosboom_2001", "ogden_
 
 @dataclass(frozen=True)
 class Above:
-    """The height above the muscle's upper face [mm]: the aponeurosis lies above it."""
+    """The height above the muscle's upper face [mm]; the aponeurosis lies above this face."""
 
     def __call__(self, points: Floats) -> Floats:
         """The heights (n,) of points (n, 3) [mm]."""
@@ -53,8 +53,8 @@ class Above:
 
 
 def vastus(n: int, arm: float) -> Body:
-    """Half a planar muscle whose fibres rise from the bone to an aponeurosis, whose end is pulled by a moment ``arm`` [mm] times
-    the knee's flexion. The aponeurosis slides below a fascia, which keeps the muscle's thickness.
+    """Half a planar muscle whose fibres rise from the bone to an aponeurosis. The end of the aponeurosis is pulled by a moment
+    ``arm`` [mm] times the knee's flexion. The aponeurosis slides below a fascia, which keeps the muscle's thickness.
     """
     counts, size = (6 * n, 2 * n, 2 * n), (APONEUROSIS, THICK, HALF_WIDTH)
     rising = Brick(lambda u: u * size + u[:, 1:2] * (ALONG, 0, 0), counts, {"y0": "bone", "z0": "middle"})
@@ -138,11 +138,11 @@ def indentation(lab: Lab, n: int, depth: float, mu: float) -> float:
     return ball_force(lab, n, depth, shipped) / ball_force(lab, n, depth, fitted)
 
 
-# By depth [mm]: half the difference of the forces at the exponents 16 and 28, over that at 22; the reported deviation is 5.7.
+# By depth [mm]: half the difference of the forces at the exponents 16 and 28, over the force at 22; the reported deviation is 5.7.
 _BY_EXPONENT = {0.6: 0.071, 1.2: 0.271}
 _SARCOMERES = find("chen_2016", "sarcomere_length", "110 deg"), find("chen_2016", "sarcomere_length", "50 deg")
 _STRETCH, _SD = ratio(*_SARCOMERES)
-_FINER = "The finer mesh is solved in twice the load steps."
+_FINER = "The finer mesh is solved in twice as many load steps."
 _OTHER_MU = (
     f"The abstract does not define mu. If the shear modulus is mu alpha / 2, {_MU.value * _ALPHA.value / 2:.0f} kPa, the ratio is "
     f"{_ALPHA.value / 2:.1f} times smaller."
@@ -181,7 +181,7 @@ ENTRIES = (
         unit="1",
         measure=vastus_stretch,
         given={"arm": ARM},
-        **control("Moment arm 10 % too great.", arm=1.1 * ARM),
+        **control("Moment arm 10 % too large.", arm=1.1 * ARM),
         truth=_STRETCH,
         within=_SD,
         because="The standard deviation of the ratio of two mean sarcomere lengths of six people, taken as independent.",

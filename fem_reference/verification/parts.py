@@ -26,7 +26,7 @@ NO_GRADIENT = ((0.0, 0.0, 0.0),) * 3
 
 
 def find(name: str) -> ModuleType:
-    """The module ``validation/<name>.py``, even where ``validation`` is not on Python's search path.
+    """The module ``validation/<name>.py``, even if ``validation`` is not on Python's search path.
 
     >>> round(find("torsion").square_bar_stiffness(1.0, 1.0), 4)
     0.1406
@@ -75,12 +75,12 @@ def resistance(element: str, bulk: float) -> Effect:
 
 
 def neo_hooke(mu: float, bulk: float, element: str = "P2/P1") -> tuple[Effect, ...]:
-    """Material of the moduli ``mu`` and ``bulk`` [MPa], for an ``element``."""
+    """Neo-Hookean material with the moduli ``mu`` and ``bulk`` [MPa], for an ``element``."""
     return make("neo_hooke", mu=f"{mu} MPa"), resistance(element, bulk)
 
 
 def mooney_rivlin(c1: float, c2: float, bulk: float) -> tuple[Effect, ...]:
-    """Material of ``c1``, ``c2`` and the modulus ``bulk`` [MPa], for elements with a pressure."""
+    """Mooney-Rivlin material with ``c1``, ``c2`` and ``bulk`` [MPa], for elements with a pressure."""
     return make("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa"), resistance("P2/P1", bulk)
 
 
@@ -95,5 +95,5 @@ def farthest(points: Floats, others: Floats) -> float:
 
 
 def nearest(points: Floats, place: Iterable[float]) -> int:
-    """The index of the one of ``points`` (n, 3) that is nearest to a ``place`` (3,)."""
+    """The index of the point in ``points`` (n, 3) that is nearest to a ``place`` (3,)."""
     return int(np.argmin(np.linalg.norm(points - np.array(tuple(place)), axis=1)))

@@ -13,7 +13,7 @@ from fem_reference.verification.fibres import active
 from fem_reference.verification.homogeneous import BULK, NEO, SIZE, STEPS, Material, X, everywhere
 from fem_reference.verification.parts import SURFACE, control, farthest, resistance
 
-# The displacement gradient of a stretch, a shear and a rotation at once, which changes the volume to 1.2 times that at rest.
+# The displacement gradient of a stretch, a shear and a rotation at once, which changes the volume to 1.2 times the rest volume.
 GRADIENT: Matrix = ((0.2, 0.35, -0.1), (-0.15, 0.05, 0.3), (0.1, -0.2, -0.15))
 COUNTS, BUMP = (2, 2, 3), 0.1
 AXIS, ANGLE, CENTRE = (1.0, 2.0, 3.0), 1.0, (1.0, -2.0, 0.5)  # rad, mm
@@ -29,14 +29,14 @@ def patch(element: str, degree: int, share: float = 1.0) -> Body:
 
 
 def patch_error(lab: Lab, element: str, degree: int, share: float = 1.0) -> float:
-    """The largest distance [mm] of a node from its place under the whole gradient."""
+    """The largest distance [mm] of a node from its place under the full gradient."""
     body = patch(element, degree, share)
     points = lab.solve(body, element, first_step=0.5, residual=1e-13).last.points
     return farthest(points, body.mesh.points @ (np.eye(3) + np.array(GRADIENT)).T)
 
 
 def turn(share: float) -> Turn:
-    """The turn from frame 1 to 2, by ``share`` of 1 rad about an oblique axis."""
+    """The turn from frame 1 to 2, by ``share`` times 1 rad about an oblique axis."""
     return Turn(AXIS, share * ANGLE, CENTRE, knots=((1.0, 0.0), (2.0, 1.0)))
 
 
@@ -64,7 +64,7 @@ def turned_energy(lab: Lab, material: Material, element: str, faces: tuple[str, 
     return after.scalars["energy"] - before.scalars["energy"]
 
 
-# The softest mode of a block of volume V with n free nodes between rigid ends a height h apart has a stiffness of
+# The softest mode of a block of volume V with n free nodes between rigid ends at a distance h has a stiffness of
 # mu (pi / h)^2 V / n = 0.003 N/mm.
 LEFT = "rounding and Newton's residual of 1e-13 N remain, 3e-11 mm in the softest mode of the block (about 0.003 N/mm)"
 BLOCK = Entry(

@@ -55,7 +55,7 @@ def truth(width: float) -> float:
 ALIGNED = Entry(
     name="series_bar",
     group="regions",
-    title="Bar of two materials in series, one a thousand times as stiff, with a border on faces of cells, by P2: force",
+    title="Bar of two materials in series, one a thousand times as stiff, with an interface on cell faces, by P2: force",
     unit="N",
     measure=force,
     given={"cells": 10, "element": "P2", "width": 0.0},
@@ -63,7 +63,7 @@ ALIGNED = Entry(
     truth=partial(truth, 0.0),
     relative=True,
     within=1e-10,
-    because="The element represents displacements that are linear in each part: Newton's residual of 1e-11 N remains, of 0.15 N.",
+    because="The element represents displacements that are linear in each part: Newton's residual of 1e-11 N remains, at 0.15 N.",
     kind="closed form",
     source="Equal nominal stress in both parts (validation/series.py).",
 )
@@ -73,21 +73,21 @@ ENTRIES = (
     replace(
         ALIGNED,
         name="series_bar_mixed",
-        title="Bar of two materials in series, one a thousand times as stiff, with a border on faces of cells, by P2/P1: force",
+        title="Bar of two materials in series, one a thousand times as stiff, with an interface on cell faces, by P2/P1: force",
         given={"cells": 10, "element": "P2/P1", "width": 0.0},
         within=1e-6,
-        because="The exact pressure jumps at the interface, the discrete one is continuous and oscillates in the cells next to it. "
+        because="The exact pressure jumps at the interface; the discrete one is continuous and oscillates in the cells next to it. "
         "The stiff cells hardly deform under any pressure; a relative error of about 1 / ratio^2 remains.",
     ),
     replace(
         ALIGNED,
         name="series_bar_transition",
-        title="Bar of two materials in series, one a thousand times as stiff, over a transition of 2 mm, by P2: force",
+        title="Bar of two materials in series, one a thousand times as stiff, with a transition of 2 mm, by P2: force",
         given={"element": "P2", "width": WIDTH},
         **control("No transition.", width=0.0),
         truth=partial(truth, WIDTH),
         within=5e-5,
-        because="The energy, and with it the force, converges at order 4 with quadratic cells, of 0.25 mm in the finest mesh.",
+        because="The energy, and with it the force, converges at order 4 with quadratic cells, down to 0.25 mm.",
         refinement=Refinement((10, 20, 40), SIZE[0], 4.0),
     ),
 )

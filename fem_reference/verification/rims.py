@@ -1,6 +1,6 @@
-"""The rim of a clamped area, near which the displacement varies as the square root of the distance: the order of convergence.
+"""Order of convergence at the rim of a clamped area, near which the displacement varies as the square root of the distance.
 
-Half of the bottom of a block is clamped, so that a clamped face and a free one meet at 180 degrees. The side beyond the free half
+Half of the bottom of a block is clamped, so that a clamped and a free face meet at 180 degrees. The side beyond the free half
 is pulled along the bottom, by a load so small that strains are about a hundredth. The opposite side slides on a plane, so that its
 corner with the clamped half is not singular.
 """
@@ -19,7 +19,7 @@ from fem_reference.verification.parts import clamped, control, find, neo_hooke, 
 ELEMENT = "Q2/Q1"
 MU, BULK = 0.01, 10.0  # [MPa]
 LOAD = 1e-4  # [MPa]
-UNIFORM, GRADED = 1.0, 0.5  # m of h ~ r^(1 - m); 1: not graded
+UNIFORM, GRADED = 1.0, 0.5  # the exponent m of h ~ r^(1 - m); 1 is not graded
 
 
 def _side(sign: float, depth: float, grading: float, unit: Floats) -> Floats:
@@ -39,7 +39,7 @@ def _halves(counts: shapes.Counts, grading: float) -> Cells:
 
 
 def body(level: int, grading: float, *, plane: bool) -> Body:
-    """A slice in ``plane`` strain, with 4 cells a side, or a block with free ends, with 3; each ``level`` doubles them."""
+    """A slice in ``plane`` strain with 4 cells a side, or a block with free ends and 3 cells a side; each ``level`` halves them."""
     n = (4 if plane else 3) * 2**level
     acting = (*neo_hooke(MU, BULK), make("traction", on="pulled", force=f"{LOAD}, 0, 0 MPa", ramp=ramp()))
     fixed = (*clamped("clamped"), *sliding("x0", *(("y0", "y1") if plane else ())))
@@ -56,14 +56,14 @@ def order(lab: Lab, grading: float, *, plane: bool) -> Finding:
 
 
 CONTROLS = {
-    UNIFORM: control("graded towards the rim", grading=GRADED),
+    UNIFORM: control("meshes graded towards the rim", grading=GRADED),
     GRADED: control("uniform meshes", grading=UNIFORM),
 }
 PLANE = "the coarsest of the three meshes has 4 cells a side; on finer meshes the order is"
 ON_PLANE = "A clamped patch in plane strain: order of convergence of its force, uniform quadratic hexahedra"
 ON_BLOCK = "A clamped patch on a block with free ends: order of convergence of its force, uniform quadratic hexahedra"
 GRADED_TOO = "The same, on meshes graded towards the rim"
-SPACE = "the coarsest of three meshes has 3 cells a side, and one along the rim, whose ends add an error of their own"
+SPACE = "the coarsest of three meshes has 3 cells a side and one cell along the rim, whose ends add their own error"
 
 ENTRIES = tuple(
     Entry(

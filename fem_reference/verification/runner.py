@@ -1,4 +1,4 @@
-"""Finds the entries of the catalogue, and measures them."""
+"""Finds the entries of the catalogue and measures them."""
 
 import importlib
 import logging
@@ -23,14 +23,14 @@ from fem_reference.foundations.errors import InputError
 
 log = logging.getLogger(__name__)
 
-# The time [s] within which a signal to all processes reaches this one, after one of a lab has ended by it.
+# The time [s] within which a signal to all processes reaches this one, after it has ended a process of a lab.
 _HEARD = 0.5
 # Errors that fail one entry while the others go on; any other is a bug in this package, or an interrupt.
 FAILURES = (InputError, ValueError, ArithmeticError, LookupError, RuntimeError, OSError)
 
 
 def entries() -> dict[str, Entry]:
-    """The catalogue: every entry by its name, in the order of the files and in each of its ``ENTRIES``."""
+    """The catalogue: every entry by its name, in the order of the files and of the ``ENTRIES`` in each."""
     names = modules.names(verification.__path__)
     return collect(importlib.import_module(f"{verification.__name__}.{name}") for name in names)
 
@@ -48,7 +48,7 @@ def collect(modules: Iterable[ModuleType]) -> dict[str, Entry]:
 
 def choose(catalogue: dict[str, Entry], wanted: Iterable[str], place: str) -> tuple[str, ...]:
     """The names of the ``wanted`` entries, in the order of the catalogue: names of entries or groups, or shell
-    patterns of them. InputError naming ``place`` where one matches nothing.
+    patterns of them. InputError naming ``place`` if one matches nothing.
     """
     chosen: set[str] = set()
     for text in wanted:
@@ -75,7 +75,7 @@ def run(
     """The results of the entries, in their order; those whose names are in ``with_negative_control`` are measured with their
     negative control.
 
-    Two run at a time where there are two cores, each thread with a lab of its own. The labs are closed even after an error. Entries
+    Two entries run at a time if there are two cores, each thread with its own lab. The labs are closed even after an error. Entries
     that an interrupt or an error ends with their labs have no result.
     """
     ended = threading.Event()
@@ -97,7 +97,7 @@ def run(
         for _ in range(labs):
             free.put(stack.enter_context(make_lab()))
         found = [pool.submit(work, entry) for entry in wanted]
-        stack.callback(lambda: [one.cancel() for one in found])  # no thread goes on to the next while the labs close
+        stack.callback(lambda: [one.cancel() for one in found])  # no thread starts another entry while the labs close
         stack.callback(ended.set)
         for one in wait(found, return_when=FIRST_EXCEPTION).done:
             one.result()
@@ -105,7 +105,7 @@ def run(
 
 
 def _measured(entry: Entry, lab: Lab, *, with_negative_control: bool) -> Result:
-    """The result of an entry; if it raised an error, its value or truth is NaN and its note says why."""
+    """The result of an entry; if it raised an error, its value or truth is NaN and its note states the error."""
     begin = time.perf_counter()
     try:
         finding = entry.find(lab, with_negative_control=with_negative_control)

@@ -111,7 +111,7 @@ def touching_denials(lab: Lab, farther: float = 0.0) -> Finding:
 
 
 def unbalanced(lab: Lab, lost: float = 0.0) -> Finding:
-    """The number of balance checks that the pressed blocks fail, with a share ``lost`` of the force that moves them."""
+    """The number of balance checks that the pressed blocks fail, if a share ``lost`` of the force that moves them is missing."""
     body = pressed_blocks(BLOCK_STIFFNESS)
     run = lab.solve(body, "P2/P1", first_step=0.5)
     forces = run.last.forces | {"high_z1": (1 - lost) * run.last.forces["high_z1"]}
@@ -132,7 +132,7 @@ def _entry(name: str, what: str, words: str, measure: Callable[..., Finding], **
         **control(words, **mistake),
         truth=0.0,
         within=0.5,
-        because="the value is a whole number, that of failed checks",
+        because="the value is a whole number, the number of failed checks",
         kind="property",
         source="fem_reference/assessment/run_checks.py",
     )

@@ -1,4 +1,4 @@
-"""The same bodies solved by scikit-fem, and with each linear solver of FEniCSx, which must not change the solution.
+"""FEniCSx and scikit-fem on the same bodies, and the linear solvers of FEniCSx, which must not change the solution.
 
 FEniCSx and scikit-fem share no assembly, no derivatives and no linear algebra. Their discretisations are the same, so that their
 states differ by Newton's residual and, where quadrature is not exact, by their rules: both use Gauss-Legendre in hexahedra, but
@@ -38,7 +38,7 @@ def agreement(
 ) -> Finding:
     """The largest of the relative differences of :func:`differences`.
 
-    ``residual`` [N, mm3]; ``quadrature``: the degree of both rules, None: each solver's own; ``error``: of a modulus in scikit-fem.
+    ``residual`` [N, mm3]; ``quadrature``: the degree of both rules, or None for their own; ``error``: that of scikit-fem's modulus.
     """
     settings: dict[str, float] = {"first_step": 0.5, "residual": residual}
     if quadrature is not None:
@@ -76,7 +76,7 @@ def built(
     return Body(mesh(kind=ELEMENTS[element][0]), acting, prescribed, (0.0, 1.0), Along((2 / 7, 3 / 7, 6 / 7)))
 
 
-# [N, mm3] that ends Newton's method; the softest mode of the bar has a stiffness of about mu w^4 / l^3 = 0.006 N/mm.
+# Newton's method ends at this [N, mm3]; the softest mode of the bar has a stiffness of about mu w^4 / l^3 = 0.006 N/mm.
 RESIDUAL = 1e-11
 
 
@@ -92,7 +92,7 @@ def turned_bar(lab: Lab, solver: str, precision: str | None, residual: float) ->
 
 
 def difference(lab: Lab, solver: str, precision: str | None = None, residual: float = RESIDUAL) -> float:
-    """The largest distance [mm] of a node from where the direct solver in double precision puts it."""
+    """The largest distance [mm] of a node from its position by the direct solver in double precision."""
     return parts.farthest(turned_bar(lab, "direct", "double", RESIDUAL), turned_bar(lab, solver, precision, residual))
 
 
@@ -160,11 +160,11 @@ BY_GAUSS = Tolerance(1e-9, f"{ALIKE} Newton's residual of 1e-8 N, at forces of 5
 
 
 def opinion(name: str, title: str, body: Callable[[], Body], element: str, tolerance: Tolerance) -> Entry:
-    """An entry for a body that both solvers solve."""
+    """The entry of a body that both solvers solve."""
     return Entry(
         name=f"second_opinion_{name}",
         group="second opinion",
-        title=f"{title}, by {element}: largest relative difference of FEniCSx and scikit-fem",
+        title=f"{title}, by {element}: largest relative difference between FEniCSx and scikit-fem",
         unit="1",
         measure=agreement,
         given={"body": body, "element": element, "residual": tolerance.residual, "quadrature": tolerance.quadrature},
@@ -178,7 +178,7 @@ def opinion(name: str, title: str, body: Callable[[], Body], element: str, toler
 
 
 def specimen(name: str, words: str, block: Specimen) -> Entry:
-    """A block of the groups homogeneous, fibres or loads; ``words`` after "A block"."""
+    """The entry of a block of the groups homogeneous, fibres or loads; ``words`` follow "A block" in its title."""
     return opinion(name, f"A block {words}", block.body, block.element, STEEPER)
 
 
@@ -207,7 +207,7 @@ LAGGED = Entry(
     **parts.control("Newton's method ends at a residual of 1e-2 N.", residual=1e-2),
     truth=0.0,
     within=1e-9,
-    because="Both end at a residual below 1e-11 N, as a rule far below; in the softest mode of the bar (about 0.006 N/mm) 1e-11 N "
+    because="Both end at a residual below 1e-11 N, usually far below; in the softest mode of the bar (about 0.006 N/mm) 1e-11 N "
     "is an error of 2e-9 mm.",
     kind="property",
     source="The solution of the equations does not depend on the linear solver.",

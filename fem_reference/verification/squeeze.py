@@ -1,13 +1,13 @@
-"""A block squeezed between plates: smooth ones, to a tenth of its height and back or until it collapses, and ones it sticks to,
-until its corners fold over.
+"""A block squeezed between smooth plates, to a tenth of its height and back or until it collapses, and between plates to which
+it sticks, until its corners fold over.
 
-Between smooth plates every state is homogeneous. Below half the height that state is unstable, but Newton's method follows it, as a
-structured mesh does not disturb it. On the return path too large a load step finds another stress-free state, the block turned by
-half a turn through its planes of symmetry. It is refused, as det F falls to 0 on the straight line to it.
+Between smooth plates every state is homogeneous. Below half the height this state is unstable, but Newton's method follows it, as a
+structured mesh does not disturb it. On the return path, too large a load step finds another stress-free state, the block turned by
+half a turn through its planes of symmetry. This state is rejected, as det F falls to 0 on the straight line to it.
 
-Where the bulk modulus is low, there is a height below which no state near the rest volume exists. The isochoric neo-Hookean energy
+If the bulk modulus is low, there is a height below which no state near the rest volume exists. The isochoric neo-Hookean energy
 favours a smaller volume, which the law ``K/2 (J - 1)^2`` cannot prevent: its pressure is K at most. With free sides the equilibrium
-is ``mu/3 (J/stretch - stretch^2) = K J^(5/3) (1 - J)``. Without ``stretch^2`` that is ``mu/(3 stretch) = K J^(2/3) (1 - J)``, whose
+is ``mu/3 (J/stretch - stretch^2) = K J^(5/3) (1 - J)``. Without ``stretch^2`` this is ``mu/(3 stretch) = K J^(2/3) (1 - J)``, whose
 right side is 0.326 K at most, at J = 2/5. Below a stretch of about mu/K the only state is near ``J = stretch^3``: a block that
 has shrunk equally along all axes, without shear and without force on the plate.
 """
@@ -29,13 +29,13 @@ STEPS = 5  # in each direction
 RESIDUAL = 1e-11  # [N, mm3]
 GLUED_TO, GLUED_STEPS = 0.4, 12
 POISSON = 0.3  # of a block that collapses
-# On the branch of states that begins at rest, on which the volume falls steeply here: from 0.59 of that at rest to 0.42.
+# Stretches on the branch of states that begins at rest; from 0.45 on, the volume falls steeply, from 0.59 to 0.42 of V0.
 STRETCHES = (1.0, 0.8, 0.6, 0.5, 0.45, 0.43, 0.425, 0.42, 0.415, 0.41, 0.405, 0.4)
-LOWEST = 0.5  # V/V0 of the range of the law
+LOWEST = 0.5  # the least V/V0 in the range of the law
 
 
 def bulk_modulus(poisson: float) -> float:
-    """The bulk modulus [MPa] of a material of the shear modulus ``MU`` [MPa]."""
+    """The bulk modulus [MPa] of a material with the shear modulus ``MU`` [MPa]."""
     return 2 * MU * (1 + poisson) / (3 * (1 - 2 * poisson))
 
 
@@ -47,7 +47,7 @@ def plated(lab: Lab, element: str, bulk: float, path: Affine, numbers: tuple[flo
 
 
 def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: float = 1.0) -> tuple[Frame, ...]:
-    """All states of the block on the path down and on a share ``back`` of the return: at even load steps, or, where the steps are
+    """All states of the block on the path down and on a share ``back`` of the return: at even load steps, or, if the steps are
     ``growing``, at the ends of both paths.
     """
     path = Affine(NO_GRADIENT, (0.0, 0.0, HEIGHT - 1), ((0.0, 0.0), (1.0, 1.0), (2.0, 1 - back)))
@@ -187,7 +187,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     SMOOTH(
         name="squeeze_volume_k1e3",
-        title="Volume of that block over its volume at rest, K/mu = 1e+03, Q2/Q1",
+        title="Volume of a block squeezed to a tenth of its height, over its rest volume, K/mu = 1e+03, Q2/Q1",
         unit="1",
         measure=volume,
         given={"element": "Q2/Q1", "bulk": 10.0},
@@ -197,7 +197,7 @@ ENTRIES: tuple[Entry, ...] = (
     *(
         SMOOTH(
             name=f"squeeze_return_{name}",
-            title=f"The distance of that block from its rest state when the plates are back, K/mu = {bulk / MU:.0e}, {element}"
+            title=f"Distance of a squeezed block from rest when the plates are back, K/mu = {bulk / MU:.0e}, {element}"
             + (", in load steps that may grow" if growing else ""),
             unit="mm",
             measure=distance_from_rest,
@@ -216,7 +216,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     GLUED(
         name="bonded_squeeze_is_inverted",
-        title="Squeezed to 0.4 of its height between plates that it sticks to, Q1/P0 folds over at its corners, as reported",
+        title="A cube squeezed to 0.4 of its height between plates that it sticks to folds over at its corners, by Q1/P0",
         measure=inverts,
         given={"element": "Q1/P0", "count": 4, "height": GLUED_TO},
         **control("squeezed to 0.7 of its height only", height=0.7),
@@ -224,14 +224,14 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     GLUED(
         name="bonded_squeeze_stays_upright",
-        title="Squeezed to 0.7 of its height between plates that it sticks to, Q2/Q1 keeps det F above zero everywhere",
+        title="A cube squeezed to 0.7 of its height between plates that it sticks to keeps det F above zero, by Q2/Q1",
         measure=stays_upright,
         given={"element": "Q2/Q1", "count": 2, "height": 0.7},
         **control("squeezed to 0.4 of its height", height=GLUED_TO),
     ),
     GLUED(
         name="bonded_squeeze_with_vertices",
-        title="Squeezed to 0.4 of its height between plates that it sticks to, P2/P1 keeps det F above zero everywhere",
+        title="A cube squeezed to 0.4 of its height between plates that it sticks to keeps det F above zero, by P2/P1",
         measure=stays_upright,
         given={"element": "P2/P1", "count": 2, "height": GLUED_TO},
         **control("a quadrature rule of degree 4, which has no points at the vertices", quadrature_degree=4),

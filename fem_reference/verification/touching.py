@@ -1,4 +1,4 @@
-"""Contact of deformable bodies: two blocks with non-matching meshes, and a ball on a large body, both elastic (Hertz)."""
+"""Contact between deformable bodies: two blocks with non-matching meshes, and a ball on a large body, both elastic (Hertz)."""
 
 import math
 from dataclasses import replace
@@ -44,12 +44,12 @@ def pressed_blocks(stiffness: float, apart: float = 0.0) -> Body:
 def blocks(lab: Lab, stiffness: float, *, itself: bool = False) -> Finding:
     """The force [N] between the pressed blocks; their faces are two surfaces, or one that touches ``itself``."""
     body = pressed_blocks(stiffness, SMOOTHING if itself else 0.0)
-    if itself:  # the blocks then begin beyond the smoothing, without pressure at rest
+    if itself:  # the blocks are then farther apart than the smoothing, without pressure at rest
         (law,), facets = body.touching, body.mesh.facets
         mesh = replace(body.mesh, facets=facets | {"faces": np.concatenate([facets[law.one], facets[law.other]])})
         body = replace(body, mesh=mesh, touching=(replace(law, one="faces", other="faces"),))
     state = lab.solve(body, "P2/P1", first_step=0.5, residual=1e-11).last
-    # On an area of 1 mm2.
+    # The force acts on an area of 1 mm2.
     most = state.scalars["touching_pressure"] / -float(state.forces["high_z1"][2])
     return Finding(float(state.forces["high_z1"][2]), note=f"the greatest pressure is {most:.3f} times the mean")
 
@@ -63,7 +63,7 @@ def _quarter(n: int) -> Cells:
 
 
 def pressed(lab: Lab, n: int, radius: float) -> Frame:
-    """A quarter of a flat body below z = 0 and of one above with a bump of ``radius`` [mm]; their far ends approach by APPROACH."""
+    """A quarter of a flat body below z = 0 and of a body above with a bump of ``radius`` [mm]; their ends approach by APPROACH."""
     low, high = _quarter(n), _quarter(n + 1)
     away = np.hypot(high.points[:, 0], high.points[:, 1])
     beyond = FLAT**2 / (2 * radius) + FLAT**2 / radius * np.tanh((away - FLAT) / FLAT)  # far from the contact

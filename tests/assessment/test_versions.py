@@ -64,7 +64,7 @@ def test_the_frame_that_counts_is_the_one_that_changed_most_and_a_change_is_said
     said = "surface deviation, rms is 3 mm nearer in frame 0: 4 before, 1 mm now, 6 times the error bar, "
     said += "and 1 mm further in frame 10"
     assert against_page.sentence(found) == said
-    assert "has no number any more in frame 10" in against_page.sentence(change((0, 2), (0, NAN)))
+    assert "no longer has a number in frame 10" in against_page.sentence(change((0, 2), (0, NAN)))
 
 
 def of(comparison, shift: float, bars: ErrorBars | None = None) -> CurrentMeasures:

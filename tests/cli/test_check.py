@@ -223,6 +223,6 @@ def test_from_another_folder_it_says_that_nothing_is_stored_there(made: Path, tm
         caplog.clear()
         monkeypatch.chdir(folder)
         assert cli.main([*words, *(["--update"] if solves else [])]) == cli.DONE
-        said = f"reference: no stored run of it in {tmp_path / 'reports' / 'runs'}; solving, about "
+        said = f"reference: no stored run in {tmp_path / 'reports' / 'runs'}; solving, about "
         assert (said in caplog.text) == solves
         assert ("reference: solved before, taken from" in caplog.text) != solves

@@ -41,5 +41,5 @@ def test_what_is_missing_and_what_can_be_solved_is_said(given: Path, tmp_path: P
 def test_nothing_that_is_known_is_bad_input(given: Path, tmp_path: Path, capsys) -> None:
     (given / "else").write_bytes(b"3")
     assert cli.main(["fetch-anatomy", str(given), "--to", str(tmp_path / "to")]) == 2
-    assert "given: got none of the 4 known files, want a folder or an archive" in capsys.readouterr().err
+    assert "given: got none of the 4 known files, want an undamaged folder or archive" in capsys.readouterr().err
     assert not (tmp_path / "to").exists()

@@ -97,7 +97,7 @@ def test_where_none_is_good_enough_the_nearest_and_the_reason_are_named(bar, tmp
     # 0.02 of 50 mm and the bar of 2 mm: what was measured is below what is asked, and what is known is not.
     assert "the nearest: pbd: sweeps = 10" in text
     assert "at most 3 mm (1 mm measured, and 2 mm, the error bar of the truth), 10 ms a frame" in text
-    assert "without the bar it would" in text
+    assert "without the bar, the error would" in text
     found = json.loads((tmp_path / "found.json").read_text())
     assert found["recommended"] is None
     assert found["nearest"]["choice"]["sweeps"] == 10

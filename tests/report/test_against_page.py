@@ -19,8 +19,8 @@ def test_the_page_has_its_table_curves_and_place(comparison, tmp_path) -> None:
     path = report.write(against_page.page(found, comparison.setup), tmp_path, "against", "fem-reference compare")
     text = path.read_text(encoding="utf-8")
     assert '<span class="badge within">within the error bar</span>' in text
-    assert "2 mm from where it was, in frame 40: vertex 0, at rest at (30, 0, 0) mm" in text
-    assert "No pictures: the program that draws them" in text
+    assert "2 mm from its earlier position, in frame 40: vertex 0, at rest at (30, 0, 0) mm" in text
+    assert "No pictures: the drawing program" in text
     assert text.count("<svg ") == 1 + against_page.MOST_CURVES
     facts = json.loads((tmp_path / "against.json").read_text())
     assert facts["counts"]["within the error bar"] == 1

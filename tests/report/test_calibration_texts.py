@@ -21,8 +21,8 @@ def test_an_estimate_has_its_interval() -> None:
     lines = text(found(1.1, known)).splitlines()
     assert lines[0] == "bar: 1 parameters from 1 measurements, 7 runs requested"
     assert lines[1] == "  neo_hooke mu: 0.011 MPa, 95 % from 0.0105 to 0.0115"
-    assert lines[2].endswith("1.10 of the standard deviations of the data")
-    assert lines[3] == "  not determined apart: mu and c1, whose errors are correlated by -0.980"
+    assert lines[2].endswith("1.10 standard deviations of the data")
+    assert lines[3] == "  not determined separately: mu and c1, whose errors are correlated by -0.980"
     assert lines[4] == "  singular values of the sensitivities: 12, 0.500"
 
 
@@ -30,7 +30,7 @@ def test_what_does_not_count_is_said() -> None:
     wide = Estimate(MU, 0.011, float("-inf"), float("inf"))
     assert "from -inf to inf: not determined by these measurements" in text(found(1.0, wide))
     bound = replace(wide, value=0.02, low=0.019, high=0.021, at="high")
-    assert "at the high end of its range, 0.02 MPa, so neither it nor its interval is meaningful" in text(
+    assert "at the high end of its range, 0.02 MPa, so neither value nor interval is meaningful" in text(
         found(1.0, bound)
     )
     assert ": the law does not fit the data" in text(found(3.0, wide))
@@ -52,4 +52,4 @@ def test_a_fit_that_could_not_go_on_says_where_and_has_no_intervals() -> None:
 def test_a_fit_that_has_not_converged_says_so() -> None:
     whole = found(1.0, Estimate(MU, 0.011, 0.0105, 0.0115))
     assert "not converged" not in text(whole)
-    assert "  not converged: a step could still lead nearer" in text(replace(whole, converged=False))
+    assert "  not converged: a further step could reduce" in text(replace(whole, converged=False))

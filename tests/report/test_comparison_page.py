@@ -63,7 +63,10 @@ def test_how_well_the_reference_is_known_is_reported(comparison):
     assert "order 1.50 in general" in text
     names = ", ".join(attachment.name for attachment in comparison.scene.attachment)
     assert f"Along the rims of {names}, where" in text
-    assert "The last column is the change of a statistic by another model of them: by exact attachments" in text
+    assert (
+        "The last column is the change of a statistic with another model of the attachments: with exact attachments"
+        in text
+    )
     assert "cause of error halved at a time (load steps)" in text
     assert "--error-bar" not in text
     # The worst frame of "quick" is the last, where the bar is not known; that of "torn" is the one before.
@@ -153,7 +156,7 @@ def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(compari
     nowhere = replace(failed, positions=np.full_like(positions, NAN))
     apart = {"quick": measured(quick, nowhere.positions)}
     text = html(replace(one, reference=nowhere, deviations=apart))
-    assert "No frame was reached, so nothing could be measured against it." in text
+    assert "No frame was reached, so nothing could be compared with it." in text
     assert "Deviations at their worst frames" not in text
     assert "not a number" not in re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)
     assert "<h2>Cost</h2>" in text
@@ -165,7 +168,7 @@ def test_what_each_frame_of_the_reference_took_is_shown_where_it_is_known(compar
     seconds = {"seconds_processor": np.arange(5.0), "contact_points": np.array([0.0, 0, 17, 0, NAN])}
     known = replace(alone(comparison), reference=replace(comparison.reference, scalars=seconds))
     text = html(known)
-    assert "Processor time of the reference to each frame" in text
+    assert "Processor time of the reference for each frame" in text
     assert re.search(r"<th>Frame</th><th>processor time \[s\]</th><th>points in contact</th>", text)
     assert "<td>17</td>" in text
     assert "Processor time of the reference" not in html(alone(comparison))

@@ -65,7 +65,7 @@ def test_a_page_is_written_over_by_the_same_command_alone(tmp_path: Path) -> Non
     put(where("a"), "one")
     name, note = pages.free(where, "a", "one")
     assert (name, note[:39]) == ("a", "replaces the page that the same command")
-    assert pages.free(where, "a", "other") == ("a-2", f"{where('a')} was made by another command, and is kept")
+    assert pages.free(where, "a", "other") == ("a-2", f"{where('a')} was made by another command and is kept")
     put(where("a-2"), "other")
     assert pages.free(where, "a", "other")[0] == "a-2"
     assert pages.free(where, "a", "third")[0] == "a-3"

@@ -339,7 +339,7 @@ def test_the_page_shows_a_dash_and_says_that_there_is_no_surface(compared) -> No
         row = text.split(f"<th>{name}<small>line_of_action</small></th>")[1].split("</tr>")[0]
         assert row.count("<td>\N{EN DASH}</td>") == 6  # of 8 columns of measures two are of fibres
         assert " ms</td>" in row  # the time of a frame is known
-    assert "A row of dashes is a solver that computes only lines" in text
+    assert "A row of dashes means that the solver computes only lines" in text
     assert "Surface of springs: distance to the reference" in text
     assert "Surface of line: distance to the reference" not in text
     assert "has no frame whose coordinates" not in text

@@ -39,7 +39,7 @@ def test_runs_of_another_case_are_refused(tmp_path) -> None:
     reference, strange = replace(run, **inside), replace(of_other, **inside)
     assert fr.compare(case, reference, [run]).word
     with pytest.raises(
-        fr.InputError, match=r'candidate "other": got a run of another case \("bar"\), want one of "bar" with all'
+        fr.InputError, match=r'candidate "other": got a run of another case \("bar"\), want a run of "bar" with all'
     ):
         fr.compare(case, reference, [of_other])
     with pytest.raises(fr.InputError, match='reference "reference": got a run of another case'):
@@ -108,7 +108,7 @@ def test_what_may_be_left_out_may_be_left_out() -> None:
 def test_error_bars_are_of_the_frames_of_the_case() -> None:
     case = fr.load_case("rod")
     arguments.check_error_bars(bars(case.numbers), case)
-    with pytest.raises(fr.InputError, match=r"error_bars: got those of frames \(0, 5\), want those of frames \(0,\)"):
+    with pytest.raises(fr.InputError, match=r"error_bars: got bars of frames \(0, 5\), want bars of frames \(0,\)"):
         arguments.check_error_bars(bars((0, 5)), case)
 
 
@@ -119,7 +119,7 @@ def bars(numbers: tuple[int, ...]) -> ErrorBars:
 
 def test_a_run_says_what_it_carries() -> None:
     """A run in memory that says of no case still has to carry what a case is measured on."""
-    with pytest.raises(fr.InputError, match=r'candidate "one": got a run of lines, surface, want one of field'):
+    with pytest.raises(fr.InputError, match=r'candidate "one": got a run of lines, surface, want a run of field'):
         arguments.check_run(Run("one", "test", Outcome("converged", ""), (0,)), fr.load_case("rod"), "candidate")
 
 

@@ -140,7 +140,7 @@ def test_a_folder_with_other_files_is_refused(tmp_path) -> None:
 def test_a_shipped_case_with_anatomy_is_left_out(tmp_path) -> None:
     """It is read only, and never solved: nothing is in the folder."""
     wanted = Sizes(0, 2, shipped=("gluteus_medius",))
-    with pytest.raises(InputError, match="a licence of its own"):
+    with pytest.raises(InputError, match="anatomy with its own licence"):
         dataset.build(tmp_path / "set", wanted, tmp_path / "runs", Workers())
 
 

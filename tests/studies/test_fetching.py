@@ -131,7 +131,7 @@ def test_where_nothing_is_known_nothing_is_made(make: Callable[[Path], None], tm
     make(tmp_path / "given")
     before = tree(tmp_path)
     with pytest.raises(
-        InputError, match=r"given: got .*want a folder or an archive \(zip, tar\) with published data, whole"
+        InputError, match=r"given: got .*want an undamaged folder or archive \(zip, tar\) with published data"
     ):
         fetch([tmp_path / "given"], tmp_path / "a" / "to", WANTED)
     assert tree(tmp_path) == before

@@ -102,7 +102,7 @@ def test_a_muscle_in_inches_is_not_taken_for_one_in_centimetres(tmp_path: Path, 
     # A muscle of 211.3 mm is 8.32 inches long, which is one in cm too; its bones in inches do not decide it.
     assert made(tmp_path, bodies(tmp_path, dict.fromkeys(SIZES, 25.4))) == cli.BAD_INPUT
     assert re.search(
-        r'--unit: got none, where "muscle.stl" is 8.32 long, a muscle in cm or in; ', capsys.readouterr().err
+        r'--unit: got no unit, but "muscle.stl" is 8.32 long, a muscle in cm or in; ', capsys.readouterr().err
     )
     # Bones in mm beside it contradict both.
     assert made(tmp_path, bodies(tmp_path, {"muscle": 25.4})) == cli.BAD_INPUT
@@ -119,7 +119,7 @@ def test_surfaces_that_are_apart_are_refused(tmp_path: Path, capsys) -> None:
     shapes.write(given["muscle"], surface, surface.points + [0, 0, 2000])
     for more in ((), ("--unit", "mm")):
         assert made(tmp_path, given, *more) == cli.BAD_INPUT
-        assert re.search(r"muscle.stl: got .*1.76e\+03 mm from it, .* want .*--unit", capsys.readouterr().err)
+        assert re.search(r"muscle.stl: got .*1.76e\+03 mm from the muscle, .* want .*--unit", capsys.readouterr().err)
     assert not (tmp_path / "mine").exists()
 
 

@@ -227,7 +227,7 @@ def test_sizes_that_make_no_other_mesh_are_refused(case, monkeypatch) -> None:
     bench = Bench(casefile.read_muscle(case), case.parent / "runs")
     reference = bench.obtain("reference", bench.scene.reference, "reference")
     with pytest.raises(
-        InputError, match=r"muscle.tet_size: got meshes of .* tetrahedra, want a size for which a coarser"
+        InputError, match=r"muscle.tet_size: got meshes of .* tetrahedra, want a size that can be coarsened"
     ):
         refinement.obtain(bench, reference)
 

@@ -155,7 +155,7 @@ def test_a_submission_is_of_one_case_as_it_was_published(place, capsys) -> None:
     assert f'got "of another one", want "{key}"' in stand("--submission", "mine")["missing"]["bar, mine"]
     submit(place / "mine", case="baar", seconds_per_frame="")
     found = stand("--submission", "mine")
-    assert found["missing"] == {"baar, mine": "this case is not solved here, only bar"}
+    assert found["missing"] == {"baar, mine": "not one of the cases solved here: bar"}
     submit(place / "mine", name="still")
     assert cli.main(["standings", "./bar", "--program", "still", "--submission", "mine"]) == cli.BAD_INPUT
     assert "still: got two solvers of this name on a case" in capsys.readouterr().err
@@ -213,7 +213,7 @@ def test_a_reference_that_fails_leaves_the_rows_before_stale(monkeypatch) -> Non
 
     stand_ins.solve_by(monkeypatch, fenicsx, stop)
     found = stand("--program", "still", "--set", "reference.newton_iterations=7")
-    assert "a reference that diverged: at frame 5" in found["missing"]["bar"]
+    assert "a reference with status diverged: at frame 5" in found["missing"]["bar"]
     assert [row["stale"] for row in found["rows"]] == [True, True]
 
 

@@ -125,7 +125,7 @@ def test_a_case_without_a_solution_has_a_status_and_no_band(tmp_path: Path, monk
     stand_ins.solve_by(monkeypatch, fenicsx, solve)
     monkeypatch.setattr(uncertainty, "carry_out", None)
     found = uncertainty.study(pulled(tmp_path, {"uncertain": PARALLEL}), tmp_path / "runs", Workers(), runs=10)
-    assert found.refused == "the reference diverged: no step was small enough at frame 10"
+    assert found.refused == "the reference has the status diverged: no step was small enough at frame 10"
     assert (found.runs, found.bands, found.failures) == (0, (), ())
     assert [one.key for one in found.parameters] == [one["key"] for one in PARALLEL]
 

@@ -43,13 +43,13 @@ def _drawn(reference: Run) -> Drawing | None:
         axes.bar(reference.numbers, seconds, width, color=REFERENCE)
         axes.set(xlabel="frame", ylabel="s")
 
-    return drawn("frame-costs", "Processor time of the reference to each frame", (5.4, 2.4), draw)
+    return drawn("frame-costs", "Processor time of the reference for each frame", (5.4, 2.4), draw)
 
 
 def _costs(comparison: Comparison) -> list[tuple[str, str, list[float | None]]]:
     """Each kind of cost, times first: its name, its unit, and its value for every run."""
     keys = dict.fromkeys(key for run in comparison.runs for key in run.outcome.cost)
     times = [key for key in keys if key.startswith("seconds")]
-    rows = [("in all" if key == "seconds" else words(key.removeprefix("seconds_")), "s", key) for key in times]
+    rows = [("total" if key == "seconds" else words(key.removeprefix("seconds_")), "s", key) for key in times]
     rows += [(words(key), "", key) for key in keys if key not in times]
     return [(name, unit, [run.outcome.cost.get(key) for run in comparison.runs]) for name, unit, key in rows]

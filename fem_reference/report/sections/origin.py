@@ -1,4 +1,4 @@
-"""Provenance of every number: effects, runs, the file of the case."""
+"""Provenance of every number: the effects, the runs and the file of the case."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,7 @@ from fem_reference.scenes.case import Case
 
 
 def facts(comparison: Comparison) -> dict[str, Any]:
-    """The origin of each run as a table, and the scene."""
+    """The origin of each run as a table, and the text of the case file."""
     path = Path(comparison.scene.place)
     tables = [{key: value for key, value in run.origin.items() if key != RECORD} for run in comparison.runs]
     origins = [(run, _flat(table)) for run, table in zip(comparison.runs, tables, strict=True)]
@@ -27,7 +27,7 @@ def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
 
 
 def changes(case: Case) -> list[tuple[str, Any, Any]]:
-    """The keys in which a case differs from its file, with the value in the file and the value here."""
+    """The keys in which a case differs from its file, with their values in the file and in the case."""
     if not case.place.endswith(".toml"):  # made without a file
         return []
     try:

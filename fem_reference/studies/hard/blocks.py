@@ -27,9 +27,9 @@ from fem_reference.studies.hard.records import FACES, FIRST, Face, Hard, Hold, L
 # The default material of blocks: the usual matrix of muscle.
 MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible", bulk="10 MPa"))
 _LINES, _POINTS = 4, 9  # the number of measured lines of each block, and of points of each line
-# The bones of held faces are balls, far from everything: their radius and distance in sizes of the block.
+# The bones of held faces are balls far from the block; their radius and distance are in sizes of the block.
 _BALL, _AWAY = 0.01, 50.0
-_SAME = 1e-9  # the rounding between equal motions of two holds, as a share of the block's size
+_SAME = 1e-9  # the greatest rounding difference between equal motions of two holds, as a share of the block's size
 
 
 def problem(hard: Hard) -> MuscleProblem:
@@ -56,7 +56,7 @@ def problem(hard: Hard) -> MuscleProblem:
         if hold.middle:
             facets[end.attachment] = index[triangles[np.isin(triangles, end.vertices).any(axis=1)]]
     if not tet_volumes(points, tets).min() > 0:
-        raise InputError("block.jitter", "a tetrahedron turned inside out", "less")
+        raise InputError("block.jitter", "a tetrahedron turned inside out", "a smaller jitter")
     return _filled(block, setup, TetMesh(points, tets, facets, maker="lattice"), acting)
 
 
@@ -128,8 +128,8 @@ def _placed(block: Lattice, nodes: Ints) -> Floats:
 
 
 def _rounded(unit: Floats, share: float) -> Floats:
-    """Points ``unit`` (n, 3) of the cube from -1 to 1 moved towards the ball inside by a ``share`` of their way: with y and z the
-    other two, x goes to ``x (1 - y^2/2 - z^2/2 + y^2 z^2/3)^(1/2)``, so that the surface of the cube is that of the ball.
+    """Points ``unit`` (n, 3) of the cube from -1 to 1 moved towards the inscribed ball by a ``share`` of the way. With y and z the
+    other two coordinates, x goes to ``x (1 - y^2/2 - z^2/2 + y^2 z^2/3)^(1/2)``, which maps the cube's surface to the ball's.
     """
     y, z = (np.roll(unit, -turn, axis=1) ** 2 for turn in (1, 2))
     return np.asarray(unit * (1 - share + share * np.sqrt(1 - y / 2 - z / 2 + y * z / 3)))
@@ -158,7 +158,7 @@ def _held(block: Lattice, hold: Hold, nodes: Ints, surface: Surface) -> Attached
 
 
 def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> None:
-    """InputError where two holds move their shared vertices to different places: most solvers would obey only one of them."""
+    """Raise InputError if two holds move their shared vertices to different places: most solvers would obey only one of them."""
     assert hard.frames is not None  # beside a block
     keyframes = (key.frame for hold in hard.hold if hold.motion for key in hold.motion.keyframes)
     frames = sorted({*hard.frames.numbers, *keyframes})
@@ -167,8 +167,8 @@ def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> N
         shared = surface.points[both]
         off = [np.ptp([apply(end.bone.pose(frame), shared) for end in (one, other)], axis=0) for frame in frames]
         if not np.max(off, initial=0.0) <= _SAME * max(hard.block.size if hard.block else (1.0,)):
-            got = f"{other.attachment}, which shares {len(both)} vertices with {one.attachment} and moves otherwise"
-            raise InputError(join(hard.place, f"hold[{j}].face"), got, "a face without a common edge, or one motion")
+            got = f"{other.attachment}, which shares {len(both)} vertices with {one.attachment} and moves differently"
+            raise InputError(join(hard.place, f"hold[{j}].face"), got, "no common edge, or the same motion")
 
 
 def _lines(block: Lattice) -> Polylines:

@@ -34,28 +34,28 @@ Solve = Callable[[Hard], tuple[Outcome, Followed]]
 
 
 class StalledError(Exception):
-    """Raised where the machine was too busy for a conclusion about a run."""
+    """Raised if the machine was too busy for a conclusion about a run."""
 
 
 def check_not_stalled(outcome: Outcome) -> None:
-    """Raise StalledError where an ``outcome`` allows no conclusion about the run."""
+    """Raise StalledError if an ``outcome`` allows no conclusion about the run."""
     if outcome.status == "stalled":
         raise StalledError(outcome.message)
 
 
 def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]:
-    """Solve a problem by a solver; InputError where it does not suit the solver, StalledError where the machine was too busy."""
+    """Solve a problem by a solver; InputError if it does not suit the solver, StalledError if the machine was too busy."""
     solver, task, muscle = choice.solver, task_of(choice.solver, built.task), mechanical(built)
     as_body = muscle is not None and task == "solve_body"
     offer = solvers.find(solver, solver, task)
     if muscle is not None and muscle.spans and solver not in (REFERENCE, SECOND):
-        raise InputError(solver, "a solver of a single body", "one that solves several")
+        raise InputError(solver, "a solver of a single body", "a solver of several bodies")
     if isinstance(offer, MuscleSolver) and offer.moves not in ("surface", "tetrahedra"):
-        want = "one that moves a surface, whose health is measured"
+        want = "a solver that moves a surface, whose health is measured"
         raise InputError(solver, f"a solver that moves {offer.moves}", want)
     tets = 0 if muscle is None or muscle.rest.mesh is None else len(muscle.rest.mesh.tets)
     if as_body and tets > _MOST_FOR_SECOND:
-        want = f"at most {_MOST_FOR_SECOND}: it is written in Python, for correctness and not for speed"
+        want = f"at most {_MOST_FOR_SECOND}: this solver is written in Python, for correctness and not for speed"
         raise InputError(solver, f"{tets} tetrahedra", want)
     settings = solvers.settings(choice, solver, task)
     solvers.check(solver, settings, effects_of(muscle) if muscle else (), solver, task)
@@ -83,7 +83,7 @@ def _of_muscle(built: MechanicalProblem, frames: list[Frame]) -> Followed:
     whole = len(tets) == len(frames)
 
     def scalar(name: str) -> Floats | None:
-        """A scalar of all frames (f,); None where a frame lacks it."""
+        """A scalar of all frames (f,); None if a frame lacks it."""
         found = [frame.scalars[name] for frame in frames if name in frame.scalars]
         return np.array(found) if len(found) == len(frames) else None
 
@@ -108,7 +108,7 @@ def _of_muscle(built: MechanicalProblem, frames: list[Frame]) -> Followed:
 
 @dataclass(frozen=True)
 class SameEnd:
-    """A comparison of runs that should end alike: ``same``: True if those that reached the end agree; a ``sentence`` about them."""
+    """A comparison of runs that should end alike: ``same`` is True if those that reached the end agree; ``sentence`` states it."""
 
     same: bool
     sentence: str
@@ -121,7 +121,7 @@ def farthest(followed: Followed) -> StepCounts | None:
 
 
 def in_steps(built: MechanicalProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
-    """Compare runs of the reference to a frame in several numbers of equal load steps with the finest run that got there."""
+    """Compare runs of the reference to a frame, in several numbers of equal load steps, with the finest run that reached it."""
     ends, words, span = dict[int, Floats](), list[str](), steps.until - built.frames[0]
     for count in steps.counts:
         step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}
@@ -137,7 +137,7 @@ def in_steps(built: MechanicalProblem, choice: SolverChoice, steps: StepCounts) 
     standard, size = ends[max(ends)], diagonal(built.rest.surface.points)
     off = {count: 100 * float(np.linalg.norm(end - standard, axis=1).max()) / size for count, end in ends.items()}
     apart = [f"{count}: {share:.2g} % from that of {max(ends)}" for count, share in off.items() if count != max(ends)]
-    listed = ", ".join(apart + words) or "one only"
+    listed = ", ".join(apart + words) or "only one"
     return SameEnd(max(off.values()) <= SAME, f"end state at frame {steps.until} by number of load steps: {listed}")
 
 
@@ -186,7 +186,7 @@ def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: So
 
 
 def _apart(one: Followed, other: Followed) -> float:
-    """The greatest distance of two runs over the frames of both [% of the body's size]."""
+    """The greatest distance between two runs over the frames of both [% of the body's size]."""
     both, off = min(len(one.numbers), len(other.numbers)), list[float]()
     for first, second in zip(one.bodies, other.bodies, strict=True):
         moved = second.positions[:both]

@@ -24,7 +24,7 @@ from fem_reference.scenes.muscle import CaseBone, Frames, Motion
 FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
 FACES: tuple[Face, ...] = get_args(Face)
-_MOST_CELLS = 50_000  # the most cells of a block, more than any solver solves within its time limit
+_MOST_CELLS = 50_000  # the greatest number of cells of a block, more than any solver solves within its time limit
 FIRST = "block"  # the name of the first of several bodies
 REFERENCE, SECOND = "fenicsx", "scikit_fem"
 LIMIT = 120.0  # the limit of processor time of a run [s]
@@ -38,7 +38,7 @@ _OWN: dict[str, dict[str, Any]] = {
 class Lattice(Record):
     """A block of ``size`` from its ``corner``, with a number of ``cells`` along each axis, each cut into six tetrahedra.
 
-    ``grading``: along each axis, the last cell over the first. ``jitter``: the greatest random displacement of nodes inside the
+    ``grading``: along each axis, ratio of last to first cell. ``jitter``: the greatest random displacement of nodes inside the
     block and its faces, in cells, by a ``seed``. ``rounding``: the share of an ellipsoid in its shape. ``fibre``: the direction of
     fibres and of the measured lines. ``points_apart`` [mm]: the spacing of points of contact and springs, by default as on muscles.
     """
@@ -68,7 +68,7 @@ class Hold(Record):
 
 
 class OtherBody(Record):
-    """Another body, by its ``name``: a ``block`` with its ``hold``, and the effects (``effect``) in place of the first's."""
+    """Another body, by its ``name``: a ``block`` with its ``hold``, and the effects (``effect``) in place of those of the first."""
 
     name: Name
     block: Lattice
@@ -77,7 +77,7 @@ class OtherBody(Record):
 
 
 class Start(Record):
-    """The state at the first frame in place of rest: points moved at ``random`` by up to an ``amount`` of cells, or the whole body
+    """The state at the first frame instead of rest: points moved at ``random`` by up to an ``amount`` of cells, or the whole body
     collapsed to its middle ``point`` or ``plane`` across z, or turned ``inside out``.
     """
 
@@ -93,7 +93,7 @@ class Shipped(Record):
     changes: dict[str, Any] = Field(default_factory=dict)
 
     def read(self) -> Case:
-        """The case with its changes; InputError where it cannot be read."""
+        """The case with its changes; InputError if it cannot be read."""
         quick = casefile.read(self.case).quick if self.quick else {}
         return casefile.read(self.case, changes=quick | self.changes)
 
@@ -111,8 +111,8 @@ class Hard(Record):
     ``healthy`` describes a healthy run in words, ``bound`` in numbers, the decisive quantity first. ``only``: the solvers that the
     case is about, by default all; ``because``: the reason. ``no_solution``: the reason why no equilibrium exists, so that a run
     should end with a status; ``contrast``: the defect that the case demonstrates, so that a run should exceed its bound.
-    ``by_effects``: the case depends on its effects and does not apply to solvers that simulate none. ``settings``: by solver, those
-    that differ from Table 5.1. ``steps``: numbers of load steps in which the reference should reach the same end state.
+    ``by_effects``: the case depends on its effects and does not apply to solvers that simulate none. ``settings``: the settings
+    by solver that differ from Table 5.1. ``steps``: numbers of load steps in which the reference should reach the same end state.
     """
 
     title: str
@@ -141,37 +141,37 @@ class Hard(Record):
     def _check_quantities(cls, bounds: tuple[Bound, ...]) -> tuple[Bound, ...]:
         strange = [bound.quantity for bound in bounds if bound.quantity not in health.QUANTITIES]
         if strange:
-            raise ValueError(f"quantities among {', '.join(health.QUANTITIES)}; {strange[0]} is none of them")
+            raise ValueError(f"quantities among {', '.join(health.QUANTITIES)}; {strange[0]} is not one of them")
         return bounds
 
     _check_bounds = key_rule(
         "bound",
         lambda bounds, _: any(bound.quantity != "from_reference" for bound in bounds),
-        "another quantity beside from_reference, which a run without a reference lacks",
+        "another quantity besides from_reference, which a run without a reference lacks",
     )
     _check_touching = key_rule(
         "beside",
         lambda others, _: not any(touching_among(one.effect) for one in others),
-        '"touching" among the effects of the first block, as it acts between all',
+        '"touching" among the effects of the first block, as it acts between all bodies',
     )
     _check_faces = key_rule(
-        "hold", lambda holds, _: len({hold.face for hold in holds}) == len(holds), "every face once"
+        "hold", lambda holds, _: len({hold.face for hold in holds}) == len(holds), "every face at most once"
     )
     _check_forms = key_rule(
-        "bone", lambda bones, _: not any(bone.surface for bone in bones), "bones of closed forms, and not of files"
+        "bone", lambda bones, _: not any(bone.surface for bone in bones), "bones in closed form, not from files"
     )
     _check_form = one_of("block", "shipped")
     _check_frames = rule(
-        lambda one: (one.block is None) == (one.frames is None), '"frames" beside "block" and only there'
+        lambda one: (one.block is None) == (one.frames is None), '"frames" with "block", and only with it'
     )
     _check_beside = rule(
         lambda one: (
             not one.beside
             or (one.block is not None and one.start is None and FIRST not in (other.name for other in one.beside))
         ),
-        f'"beside" with a "block", without a "start", and no body named "{FIRST}", as the first is',
+        f'"beside" with a "block", without a "start", and no body named "{FIRST}", the name of the first',
     )
-    _check_because = rule(lambda one: bool(one.only) == bool(one.because), '"because" beside "only" and only there')
+    _check_because = rule(lambda one: bool(one.only) == bool(one.because), '"because" with "only", and only with it')
 
     def choice(self, defaults: SolverChoice) -> SolverChoice:
         """The solver of ``defaults`` with the settings that this case changes."""
@@ -180,7 +180,7 @@ class Hard(Record):
 
 
 def choices() -> dict[str, SolverChoice]:
-    """Settings for hard cases by solver: its own for these, else those of the first candidate of Table 5.1 with that solver."""
+    """Settings for hard cases by solver: its special ones, else those of the first candidate of Table 5.1 with that solver."""
     found = {name: SolverChoice(solver=name, **settings) for name, settings in _OWN.items()}
     for candidate in solvers.in_table():
         found.setdefault(candidate.solver, SolverChoice(solver=candidate.solver, **candidate.settings))
@@ -208,19 +208,19 @@ def read_all(names: tuple[str, ...] = ()) -> tuple[Hard, ...]:
 
 
 def read(path: Path) -> Iterator[Hard]:
-    """The hard cases in a file: itself, or a case for each ``[[variant]]`` with its keys; InputError where one is invalid."""
+    """The hard cases in a file: the case itself, or one for each ``[[variant]]`` with its keys; InputError if one is invalid."""
     table, folder = texts.toml(path), path.parent.name
     if "variant" not in table:
         yield _hard(table, folder, str(path))
         return
     variants = table.pop("variant")
     if not isinstance(variants, list) or not variants or not all(isinstance(one, dict) for one in variants):
-        raise InputError(join(str(path), "variant"), repr(variants), "tables, [[variant]] each")
+        raise InputError(join(str(path), "variant"), repr(variants), "a list of tables, each under [[variant]]")
     found = set[str]()
     for i, variant in enumerate(variants):
         where, label = join(str(path), f"variant[{i}]"), variant.pop("name", "")
         if not isinstance(label, str) or not label or label in found:
-            raise InputError(join(where, "name"), repr(label), "a name of its own")
+            raise InputError(join(where, "name"), repr(label), "a unique name")
         found.add(label)
         yield _hard(_merged(table, variant), f"{folder}.{label}", where)
 
@@ -237,13 +237,13 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
         table = table | {"beside": others}
     hard = parse(Hard, table | whose, where)
     if hard.contrast and hard.no_solution:
-        want = 'nothing beside "no_solution", as no run should reach its end'
+        want = 'no contrast with "no_solution", as no run should reach its end'
         raise InputError(join(where, "contrast"), f'"{hard.contrast}"', want)
     scene = hard.shipped.read() if hard.shipped else None
     task: Task = scene.task if scene else "solve"
     for i, bound in enumerate(hard.bound):
         if (bound.quantity == "overshoot") != (task == "solve_field"):
-            want = "overshoot for a scalar field, and only there"
+            want = "overshoot for a scalar field, and only for one"
             raise InputError(join(where, f"bound[{i}].quantity"), f'"{bound.quantity}"', want)
     if hard.frames is not None:
         consistency.check_acting(hard.effect, [bone.name for bone in hard.bone], hard.frames, where)
@@ -257,7 +257,7 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
 
 
 def _check_solvers(hard: Hard, task: Task) -> None:
-    """InputError where a case names a solver that does not solve hard cases, or a setting that a solver lacks."""
+    """Raise InputError if a case names a solver that does not solve hard cases, or a setting that a solver lacks."""
     named = [(f"only[{i}]", name) for i, name in enumerate(hard.only)]
     known = choices() if named or hard.settings else {}
     for key, name in [*named, *((f"settings.{name}", name) for name in hard.settings)]:
@@ -270,6 +270,6 @@ def _check_solvers(hard: Hard, task: Task) -> None:
 
 
 def _merged(table: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """``table`` with the keys of ``changes`` in place of its own, tables key by key."""
+    """``table`` with the keys of ``changes`` in place of its own; nested tables are merged key by key."""
     both = [key for key, value in changes.items() if isinstance(value, dict) and isinstance(table.get(key), dict)]
     return table | changes | {key: _merged(table[key], changes[key]) for key in both}

@@ -58,7 +58,7 @@ class Posed:
 
     @cached_property
     def problem(self) -> CaseProblem:
-        """The problem; InputError where the case is invalid."""
+        """The problem; InputError if the case is invalid."""
         if self.hard.block is not None:
             return blocks.several(self.hard) if self.hard.beside else blocks.problem(self.hard)
         shipped = self.hard.shipped
@@ -75,9 +75,9 @@ def run(
     in_steps: bool = False,
     jitters: int = 0,
 ) -> Stress:
-    """Run every solver, or ``only`` these, and the user's ``own`` on each case, the reference first and also ``in_steps`` and on a
-    number of other meshes, ``jitters``. ``own``: with each solver, the effects that it models besides a law of the whole muscle,
-    None if unknown.
+    """Run every solver, or ``only`` the named ones, and the user's ``own`` on each case, the reference first. It also runs
+    ``in_steps`` and on ``jitters`` other meshes. ``own`` has, for each solver, the effects that it models besides a law of the
+    whole muscle, None if unknown.
     """
     begin, clock, cells = time.perf_counter(), MachineTime.now(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
@@ -97,8 +97,8 @@ def run(
 
 
 def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = None) -> Cell:
-    """The cell of a case by a solver; a failure is a verdict, never an exception. Not applicable where the solver leaves out an
-    effect: ``takes`` lists those that it models beside a law, None if unknown.
+    """The cell of a case by a solver; a failure is a verdict, never an exception. Not applicable if the solver leaves out an
+    effect: ``takes`` lists the effects that it models besides a law, None if unknown.
     """
     begin = time.perf_counter()
     hard, solver = posed.hard, choice.solver
@@ -134,8 +134,8 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """Raise _Late after ``seconds`` of this process's processor time, and StalledError after ``CLOCK`` times as long by the clock,
-    both only in the main thread; processes of the reference have a limit of their own.
+    """Raise _Late after ``seconds`` of this process's processor time, and StalledError after ``CLOCK`` times as much clock time,
+    both only in the main thread; processes of the reference have their own limit.
     """
 
     def late(*_: object) -> None:
@@ -143,7 +143,7 @@ def _limited(seconds: float) -> Iterator[None]:
 
     def stalled(*_: object) -> None:
         raise StalledError(
-            f"more than {CLOCK * seconds:g} s by the clock, but less than {seconds:g} s of processor time"
+            f"more than {CLOCK * seconds:g} s of clock time, but less than {seconds:g} s of processor time"
         )
 
     if threading.current_thread() is not threading.main_thread():
@@ -180,7 +180,7 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
 
 
 def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
-    """The cell of a run by the quantities that the case bounds."""
+    """The cell of a run, judged by the quantities that the case bounds."""
     known = [bound for bound in hard.bound if bound.quantity != "from_reference" or followed.truth is not None]
     histories = [(bound, health.history(followed, bound.quantity)) for bound in known]
     begins = followed.least_determinant

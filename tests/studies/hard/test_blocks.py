@@ -27,11 +27,11 @@ def test_holds_that_would_tear_an_edge_are_refused() -> None:
     for other in ("x0", "y1"):
         torn = hard.model_copy(update={"hold": (top, bottom.model_copy(update={"face": other}))})
         with pytest.raises(
-            InputError, match=rf"hold\[1\]\.face: got {other}, which shares 4 vertices with z1 and moves other"
+            InputError, match=rf"hold\[1\]\.face: got {other}, which shares 4 vertices with z1 and moves diff"
         ):
             blocks.problem(torn)
         found = running.cell(running.Posed(torn), records.choices()["pbd"])
-        assert (found.verdict, "moves otherwise" in found.sentence) == ("not applicable", True)
+        assert (found.verdict, "moves differently" in found.sentence) == ("not applicable", True)
     # Faces that move alike may meet, as may the middle of one.
     alike = (top, top.model_copy(update={"face": "x0"}))
     assert len(blocks.problem(hard.model_copy(update={"hold": alike})).attached) == 2

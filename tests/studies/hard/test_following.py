@@ -39,7 +39,7 @@ def test_a_body_of_many_tetrahedra_is_too_large_for_the_second_solver() -> None:
 
 
 def test_a_solver_that_moves_lines_has_no_health() -> None:
-    with pytest.raises(InputError, match="got a solver that moves lines, want one that moves a surface"):
+    with pytest.raises(InputError, match="got a solver that moves lines, want a solver that moves a surface"):
         follow(blocks.problem(CASES["at_rest.millimetres"]), records.choices()["line_of_action"])
 
 
@@ -136,5 +136,5 @@ def test_bodies_in_each_other_are_compared_each_with_itself() -> None:
 
 def test_a_solver_of_one_body_does_not_apply_to_several() -> None:
     """It ended in an AttributeError, which counted as a failure of the solver."""
-    with pytest.raises(InputError, match="xpbd: got a solver of a single body, want one that solves several"):
+    with pytest.raises(InputError, match="xpbd: got a solver of a single body, want a solver of several bodies"):
         follow(blocks.several(CASES["neighbours.squeezed"]), records.choices()["xpbd"])
