@@ -33,7 +33,7 @@ _KEPT = 1e-6
 
 
 class Projections(Record):
-    """PBD's projections after ARAP: how many ``sweeps`` over all constraints, and their stiffnesses as in ``pbd``."""
+    """Projections of PBD after ARAP: the number of ``sweeps`` over all constraints, and stiffnesses as in ``pbd``."""
 
     sweeps: Annotated[int, Field(gt=0)]
     stretch: Stiffness
@@ -42,10 +42,10 @@ class Projections(Record):
 
 
 class ArapPbdSettings(Record):
-    """Settings of ARAP, with the rows of attached vertices removed and rotations fitted in each iteration, and of its volume.
+    """Settings of ARAP with preserved volume; rows of attached vertices are removed, and each iteration fits the rotations.
 
-    ``weights``, ``iterations`` and ``tolerance``: as in ``arap``; "tutte" is not offered, as with removed rows it gives the states
-    of "kirchhoff". ``volume_constraint``: minimise the energy at the rest volume. ``projections``: none by default.
+    ``weights``, ``iterations`` and ``tolerance``: as in ``arap``; "tutte" is not offered, as with removed rows it gives the same
+    states as "kirchhoff". ``volume_constraint``: minimise the energy at the rest volume. ``projections``: PBD after ARAP, or none.
     """
 
     weights: Symmetric

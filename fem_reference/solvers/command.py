@@ -45,10 +45,10 @@ Value = int | float | str
 class CommandSettings(Record):
     """The command line, with a value for each setting that it contains.
 
-    ``unit``: the unit of length of its frames, by default the unit in a ``candidate.toml`` beside them, otherwise mm. ``version``:
-    the version of the program. ``files``: further files and folders that determine its results, besides those in the command.
-    ``moves``: the mesh whose points the program moves. ``time_limit``: of processor time. ``directory``: its working directory.
-    ``ladder``: useful values of settings, from the fastest to the most accurate.
+    ``unit``: the unit of length of the frames, by default the unit in a ``candidate.toml`` beside them, otherwise mm. ``version``:
+    the version of the program. ``files``: files and folders that determine the results, in addition to those named in the command.
+    ``moves``: the mesh whose points the program moves. ``time_limit``: the limit on processor time. ``directory``: the working
+    directory. ``ladder``: useful values of settings, from the fastest to the most accurate.
     """
 
     model_config = ConfigDict(protected_namespaces=())

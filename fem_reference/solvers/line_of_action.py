@@ -29,11 +29,11 @@ from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
 
 
 class LineSettings(Record):
-    """Points through which and obstacles around which lines go; without any key lines are straight.
+    """Points through which lines pass, and obstacles around which they wrap; without any key, lines are straight.
 
-    ``via``: points in the order in which a fibre passes them. ``via_count``: instead, a number of points evenly spread over each
-    fibre, each on the bone of the nearer end. ``obstacle``: surfaces around which each segment between two fixed points goes if the
-    straight path would cross them. ``hill``: forces of the lines.
+    ``via``: points in the order in which a fibre passes them. ``via_count``: instead of ``via``, a number of points spread evenly
+    over each fibre, each on the bone of the nearer end. ``obstacle``: surfaces around which a segment between two fixed points
+    wraps if the straight path would cross them. ``hill``: forces of the lines.
     """
 
     via: tuple[Via, ...] = ()

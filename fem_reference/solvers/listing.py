@@ -25,7 +25,7 @@ SQUARE, LINEAR, CONSTANT = 26.0, 2.0, 0.05
 
 
 class ListingSettings(Record):
-    """``peclet``: the argument of listing 4.1, by default 1 as in its header; listing 4.5 has no argument."""
+    """``peclet``: the Peclet number, the argument of listing 4.1, by default 1 as in its header; listing 4.5 has no argument."""
 
     peclet: float | None = Field(default=None, gt=0)
 

@@ -47,13 +47,13 @@ def _damping(text: object) -> float | str:
 
 
 class MassSpringSettings(Record):
-    """Stiffness and density of the muscle, and the time of the solver.
+    """Stiffness and density of the muscle, and times of the solver.
 
-    ``stiffness``: of every spring. ``density``: of the muscle. All masses are equal: equilibrium does not depend on masses, and a
-    small mass would make every time step small. ``frame_time``: the solver's time between successive frame numbers; the longer it
-    is, the nearer the muscle is to equilibrium. The scene's interval applies to the reference and to recorded sequences.
+    ``stiffness``: of every spring. ``density``: of the muscle. All masses are equal, as equilibrium does not depend on masses and a
+    single small mass would make every time step small. ``frame_time``: the solver's time between successive frame numbers; the
+    longer it is, the nearer the muscle is to equilibrium. The scene's interval applies to the reference and to recorded sequences.
     ``damping``: the coefficient c, or ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an acceleration, by default
-    none. ``collision``: contact with bones at every step, by default none. ``time_step``: the longest, by default a stable one.
+    none. ``collision``: contact with bones at every step, by default none. ``time_step``: the longest, by default a stable step.
     """
 
     stiffness: Stiffness

@@ -41,8 +41,8 @@ _PUSHES, _SCALINGS = 4, 3
 
 
 class RbfSettings(Record):
-    """``gaussians``: their number; each has four parameters. ``iterations``: local and global steps of a frame number. ``volume``:
-    keep the volume by a change of radii. ``contact``: avoid bones; by default off.
+    """``gaussians``: their number; each has four parameters. ``iterations``: local and global steps for each frame number.
+    ``volume``: preserve the volume by changing the radii. ``contact``: avoid bones; by default off.
     """
 
     gaussians: Annotated[int, Field(ge=2), Trade((10, 30, 100))]

@@ -44,10 +44,10 @@ ABOUT = "candidate.toml"
 
 
 class RecordedSettings(Record):
-    """The place of the sequence, and its unit of length.
+    """Location of the sequence, and its unit of length.
 
-    ``folder``: a folder with one mesh file for each frame, numbered by the last digits of the name; a .pvd or .xdmf file or a
-    folder with one; or the folder of a stored run.
+    ``folder``: a folder with one mesh file for each frame, numbered by the last digits of its name; a .pvd or .xdmf file, or a
+    folder that contains one; or the folder of a stored run.
     """
 
     folder: str
@@ -56,8 +56,8 @@ class RecordedSettings(Record):
 
 class About(Record):
     """The contents of ``candidate.toml``: who computed the sequence, its unit of length, the time [s] to solve one frame, the
-    number of threads, and the parts of the scene ``left_out``, in words. For standings: the ``group`` of its method, the ``case``,
-    the key ``scene`` that its export states, and the ``sha256`` of each file by name, which is checked.
+    number of threads, and the parts of the scene ``left_out``, in words. For standings: the ``group`` of the method, the ``case``,
+    the key ``scene`` that the export states, and the ``sha256`` of each file by name, which is checked.
     """
 
     name: FileName | None = None

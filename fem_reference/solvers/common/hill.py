@@ -118,9 +118,9 @@ class Hill(Record):
 
 
 class HillSettings(Record):
-    """Lines as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1). ``max_force``: of all lines together.
-    ``fibre_share``: the optimal length of the fibres of a line over its length at the first frame, at which its tendon is just
-    slack; ``pennation``: the angle of the fibres; ``activation``: from 0 to 1.
+    """Settings of lines as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1). ``max_force`` of all lines
+    together. ``fibre_share``: the optimal fibre length of a line divided by its length at the first frame, at which its tendon is
+    just slack. ``pennation``: the angle between fibres and tendon. ``activation``: from 0 to 1.
     """
 
     max_force: Force

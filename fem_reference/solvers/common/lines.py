@@ -29,12 +29,12 @@ class CurvePoint(Record):
 
 
 class Via(Record):
-    """A point of every fibre that moves with a ``bone``. ``at``: its place at rest, as a share of the fibre's length.
+    """A point of every fibre, which moves with a ``bone``. ``at``: its place at rest, as a share of the fibre's length.
 
     ``within``: the least and the greatest angle of the ``joint`` at which lines pass through the point; at other angles they omit
-    it. ``curve``: its positions on the bone by the joint's angle, the same for all fibres. In between, the positions follow
-    Catmull-Rom splines, with the slopes of parabolas through neighbours; beyond the ends the nearest position is used. ``at`` then
-    only orders the points.
+    it. ``curve``: its positions on the bone at some angles of the joint, the same for all fibres. Between these angles the point
+    moves along Catmull-Rom splines, with the slopes of parabolas through neighbouring positions; beyond the ends it stays at the
+    last position. ``at`` then only determines the order of the points.
     """
 
     at: Annotated[float, Field(gt=0, lt=1)]

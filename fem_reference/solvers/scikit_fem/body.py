@@ -29,13 +29,13 @@ _GROWTH = 10.0  # the growth of the residual above which a Newton step is halved
 
 
 class ScikitBodySettings(Record):
-    """Numerics of a body; steps are in frame numbers.
+    """Numerical settings for a body; load steps are in frame numbers.
 
-    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one step to each
-    frame: it grows by half after an easy step (at most 5 Newton iterations) and is halved if Newton's method needs more than
-    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal forces and of
-    the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are integrated exactly on a
-    straight cell, by default as the element requires.
+    ``element``: one of ``body.ELEMENTS``. The load step begins with ``first_step``, by default one step to each frame. It grows by
+    half after an easy step (at most 5 Newton iterations) and is halved, down to ``smallest_step``, if Newton's method needs more
+    than ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal forces and
+    of the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are integrated exactly
+    on a straight cell, by default as the element requires.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
