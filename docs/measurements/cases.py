@@ -139,7 +139,9 @@ def _omission_rows() -> str:
         ]
         time = "" if one["time"] is None else f"{100 * one['time']:.0f} %"
         rows.append((name, *changes, time, one["verdict"] or one["status"]))
-    return table("effects", ("omitted", "surface, rms", "fibre length, rms", "volume", "remaining time", "result"), rows)
+    return table(
+        "effects", ("omitted", "surface, rms", "fibre length, rms", "volume", "remaining time", "result"), rows
+    )
 
 
 def _study(found: dict[str, Any]) -> Any:

@@ -157,7 +157,7 @@ class Alternation(MovingSurface):
         done = f"{frames} frames in {self.cost['local_global_steps']:.0f} iterations"
         if missed := self.cost["frames_off_tolerance"]:
             advice = "more iterations or a larger tolerance may help"
-            return Outcome("out of steps", f"{done}, {missed:.0f} did not meet the tolerance; {advice}")
+            return Outcome("out of steps", f"{done}, of which {missed:.0f} did not meet the tolerance; {advice}")
         return Outcome("converged", done)
 
 
@@ -190,7 +190,7 @@ def alternate[S: Record](make: Callable[[Setup, S], Alternation], setup: Setup, 
     """Move the attached vertices and relax the others, frame number by frame number."""
     model = timed(make, setup, settings)
     if len(loose := model.system.loose):
-        why = f"vertex {loose[0]}: nothing but triangles without area or weight ties it to an attached vertex"
+        why = f"vertex {loose[0]}: only triangles without area or weight connect it to an attached vertex"
         hint = "kirchhoff weights do not depend on areas"
         return refused(model, setup.frames[0], sink, Trouble("diverged", f"{why}; {hint}"))
     return follow(model, setup, sink)

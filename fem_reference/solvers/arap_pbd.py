@@ -90,11 +90,11 @@ def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest
             moved = at_volume(system, minimum, points, rest)
         count, met, points = count + 1, tolerance is not None and farthest(moved - points) <= tolerance, moved
         if (far := farthest(moved - minimum)) > np.cbrt(rest.six_volumes / 6):
-            why = f"the nearest positions of the volume at rest are {far:.3g} mm away"
+            why = f"the nearest positions with the volume at rest are {far:.3g} mm away"
             return Relaxed(points, count, False, Trouble("diverged", why))
     ratio = volume(points, rest.triangles)[0] / rest.six_volumes
     kept = not settings.volume_constraint or abs(ratio - 1) <= _KEPT
-    lost = Trouble("diverged", f"no multiplier keeps the volume, it is {ratio:.6g} of that at rest")
+    lost = Trouble("diverged", f"no multiplier preserves the volume, which is {ratio:.6g} of the volume at rest")
     return Relaxed(points, count, met or tolerance is None, None if kept else lost)
 
 

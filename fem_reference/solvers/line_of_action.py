@@ -135,7 +135,7 @@ def _on_bones(
 ) -> dict[str, float]:
     """The force [N] and, about the origin, the moment [N mm] on each bone by lines of these ``tensions`` (k,) [N].
 
-    A part pulls along itself at both of its ends; an obstacle bears the pulls of both sides, as the line has no weight.
+    A part pulls at both of its ends, along its direction; an obstacle bears the pulls of both sides, as the line has no weight.
     """
     fixed, on_bone = passed.points, passed.on
     pulls = np.repeat(tensions, fixed.shape[1] - 1)[:, None]

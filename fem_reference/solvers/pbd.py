@@ -125,7 +125,7 @@ def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
 
 
 def solve(setup: Setup, settings: PbdSettings, sink: Sink) -> Outcome:
-    """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
+    """Iterate from rest at the first of ``setup.frames`` to the last of them; each requested frame goes into ``sink``."""
     return follow(timed(PbdSurface, setup, settings), setup, sink)
 
 

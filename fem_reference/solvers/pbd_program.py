@@ -171,7 +171,7 @@ def constraints_of(setup: Setup, settings: ProgramSettings) -> PbdConstraints:
 
 
 def solve(setup: Setup, settings: ProgramSettings, sink: Sink) -> Outcome:
-    """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
+    """Iterate from rest at the first of ``setup.frames`` to the last of them; each requested frame goes into ``sink``."""
     return follow(timed(ProgramSurface, setup, settings), setup, sink)
 
 

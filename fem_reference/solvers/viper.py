@@ -66,7 +66,7 @@ class Bundle:
         self.sizes = sizes[..., 0] - np.sum(self.means**2, axis=2)
 
     def goals(self, points: Floats, radii: Floats, frames: Floats) -> tuple[Floats, Floats]:
-        """The wanted points (k, p, 3) and radii (k, p) [mm], from the present ones with ``frames`` (k, p, 3, 3)."""
+        """The target points (k, p, 3) and radii (k, p) [mm], from the present ones with ``frames`` (k, p, 3, 3)."""
         now = (points - self.middle).swapaxes(0, 1)
         parts = now[..., None] * self.sections[..., None, :]
         parts += (self.radius * radii.T)[..., None, None] * frames.swapaxes(0, 1)
@@ -136,7 +136,7 @@ class Rods(MovingSurface):
         self.last = number
 
     def _moved(self, ends: Ints, number: int) -> tuple[Floats, Floats]:
-        """Points and turns as if each rod had moved with the bone at one of its ends, ``ends`` (k,), since the last number."""
+        """Points and turns if each rod had moved with the bone at one of its ends, ``ends`` (k,), since the last frame number."""
         points, turns = np.empty_like(self.rods), np.empty_like(self.turns)
         for n in np.unique(ends):
             bone = self.problem.bones[n]

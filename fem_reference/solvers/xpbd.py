@@ -174,7 +174,7 @@ def advance(
 
 
 def solve(setup: Setup, settings: XpbdSettings, sink: Sink) -> Outcome:
-    """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
+    """Iterate from rest at the first of ``setup.frames`` to the last of them; each requested frame goes into ``sink``."""
     outcome = follow(timed(XpbdSurface, setup, settings), setup, sink, settings.sub_steps)
     return replace(outcome, message=outcome.message + other_clock(setup, settings.frame_time))
 

@@ -78,7 +78,7 @@ class Hill(Record):
         pulls = np.array([self.imbalance(path, one, activation) for one in lengths.tolist()]) >= 0
         found = int(np.argmax(pulls))
         if found == 0:
-            want = "one on which fibres keep a tenth of their optimal length"
+            want = "a path on which fibres keep a tenth of their optimal length"
             raise InputError("hill", f"a path of {path:.4g} mm", want)
         bracket = lengths[found - 1], lengths[found]
         fibre = float(scipy.optimize.brentq(lambda one: self.imbalance(path, one, activation), *bracket, xtol=1e-13))

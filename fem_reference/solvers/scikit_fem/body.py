@@ -52,15 +52,15 @@ def _check_known(body: Body) -> None:
         name, got = ("touching", "parts that touch") if body.touching else ("contact", "bones")
         raise InputError(name, got, "a body without it, as this solver has no contact")
     if any(not isinstance(entry.on, str) for entry in body.prescribed):
-        want = "springs on facets, as this solver has no others"
+        want = "springs on facets, as this solver has no other springs"
         raise InputError("prescribed", "springs at points of a skin", want)
     if body.start is not None:
         raise InputError("start", "a state other than rest", "rest, from which this solver begins")
     timed = [effect.title for effect in body.effects if "interval" in effect.needs]
     if timed:
-        raise InputError("effects", ", ".join(timed), "effects without rates, as this solver has no time")
+        raise InputError("effects", ", ".join(timed), "effects without rates, as this solver has no time steps")
     if in_situ.among(body.effects) is not None:
-        want = "effects that leave the body at rest, as this solver balances no tension there"
+        want = "effects that leave the body at rest, as this solver balances no tension at rest"
         raise InputError("effects", "in_situ", want)
     if any(isinstance(effect, Load) and effect.stored for effect in body.effects):
         raise InputError("effects", "membrane", "effects without it: this solver has no energy of a surface")
@@ -163,7 +163,7 @@ class March:
                 return ended("the equations have no unique solution")
             then = self._along(now, step, free, np.inf if gap.any() else _GROWTH * residuals[-1], frame)
             if then is None:
-                return ended("no part of a Newton step has bounded forces")
+                return ended("the forces are unbounded, however short the Newton step is")
             now = then
 
     def _along(self, now: _Tangent, step: Floats, free: Ints, limit: float, frame: float) -> _Tangent | None:
