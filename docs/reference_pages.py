@@ -7,7 +7,7 @@ import argparse
 import inspect
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from html import escape
 from pathlib import Path
 from types import NoneType, UnionType
@@ -282,9 +282,9 @@ def _value(annotation: Any, metadata: Any = ()) -> str:
     if hasattr(annotation, "__metadata__"):
         return _value(annotation.__origin__, (*annotation.__metadata__, *metadata))
     if origin is Literal:
-        return " or ".join(f"`{_plain(value)}`" for value in inside) + after
+        return _either(f"`{_plain(value)}`" for value in inside) + after
     if origin in (Union, UnionType):
-        return " or ".join(dict.fromkeys(filter(None, map(_value, inside)))) + after
+        return _either(dict.fromkeys(filter(None, map(_value, inside)))) + after
     if origin is tuple and inside[-1:] == (Ellipsis,):
         return f"list of {_many(_value(inside[0]))}{after}"
     if origin is tuple:
@@ -294,6 +294,12 @@ def _value(annotation: Any, metadata: Any = ()) -> str:
     if isinstance(annotation, type) and issubclass(annotation, Record):
         return f"`{annotation.__name__}` table"
     return _WORDS.get(annotation, getattr(annotation, "__name__", str(annotation))) + after
+
+
+def _either(values: Iterable[str]) -> str:
+    """Alternatives in words."""
+    *first, last = values
+    return f"{', '.join(first)} or {last}" if first else last
 
 
 def _many(value: str) -> str:
