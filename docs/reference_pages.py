@@ -7,7 +7,7 @@ import argparse
 import inspect
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from html import escape
 from pathlib import Path
 from types import NoneType, UnionType
@@ -37,7 +37,7 @@ from fem_reference.studies.hard.records import Hard
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 _BOUNDS = {Gt: ("gt", ">"), Ge: ("ge", "≥"), Lt: ("lt", "<"), Le: ("le", "≤")}
-_WORDS = {str: "text", float: "number", int: "whole number", bool: "true or false", NoneType: "", Any: "any"}
+_WORDS = {str: "string", float: "number", int: "whole number", bool: "true or false", NoneType: "", Any: "any value"}
 
 
 def fill(text: str) -> str:
@@ -176,7 +176,7 @@ def _formula(record: type[Record]) -> str:
     return _cell(_markdown(inspect.getdoc(record) or "").partition("\n\n")[0])
 
 
-_RAMP = "list of table RampPoint (at least 1)"
+_RAMP = "list of `RampPoint` tables (at least 1)"
 
 
 def _parameter(named: tuple[str, Any]) -> str:
@@ -184,13 +184,12 @@ def _parameter(named: tuple[str, Any]) -> str:
     key, field = named
     value = _value(field.annotation, field.metadata)
     for long, short in (
-        (_RAMP, "list of `{ frame, amount }`"),
-        ("three quantities, kept in", "three, in"),
-        ("quantity, kept in ", ""),
-        (" (", " "),
-        (")", ""),
+        (re.escape(_RAMP), "list of `{ frame, amount }`"),
+        (r"vector \[(.*?)\]", r"vector, \1"),
+        (r"quantity \[(.*?)\]", r"\1"),
+        (r" \((.*)\)", r", \1"),
     ):
-        value = value.replace(long, short)
+        value = re.sub(long, short, value)
     return f"`{key}` ({_cell(value)}{'' if field.is_required() else ', optional'})"
 
 
@@ -257,7 +256,7 @@ def _sections(records: dict[str, list[type[Record]]]) -> str:
 
 def _section(title: str, record: type[Record]) -> str:
     rows = [_row(name, field) for name, field in _fields(record).items()]
-    table = "| key | value | without it |\n|---|---|---|\n" + "".join(rows) if rows else "No keys of its own.\n"
+    table = "| key | value | default |\n|---|---|---|\n" + "".join(rows) if rows else "It has no keys of its own.\n"
     return f"### {title}\n\n{_markdown(inspect.getdoc(record) or '')}\n\n{table}\n"
 
 
@@ -279,22 +278,33 @@ def _value(annotation: Any, metadata: Any = ()) -> str:
     bounds += [f"at most {one.max_length}" for one in metadata if isinstance(one, MaxLen)]
     after = f" ({', '.join(bounds)})" if bounds else ""
     if unit:
-        return f"{'three quantities' if origin is tuple else 'quantity'}, kept in {unit}{after}"
+        return f"{'vector' if origin is tuple else 'quantity'} [{unit}]{after}"
     if hasattr(annotation, "__metadata__"):
         return _value(annotation.__origin__, (*annotation.__metadata__, *metadata))
     if origin is Literal:
-        return " or ".join(f"`{_plain(value)}`" for value in inside) + after
+        return _either(f"`{_plain(value)}`" for value in inside) + after
     if origin in (Union, UnionType):
-        return " or ".join(dict.fromkeys(filter(None, map(_value, inside)))) + after
+        return _either(dict.fromkeys(filter(None, map(_value, inside)))) + after
     if origin is tuple and inside[-1:] == (Ellipsis,):
-        return f"list of {_value(inside[0])}{after}"
+        return f"list of {_many(_value(inside[0]))}{after}"
     if origin is tuple:
-        return f"list of {len(inside)}: {_value(inside[0])}{after}"
+        return f"list of {len(inside)} {_many(_value(inside[0]))}{after}"
     if origin is dict:
-        return f"table of {_value(inside[1])}{after}"
+        return f"table of {_many(_value(inside[1]))}{after}"
     if isinstance(annotation, type) and issubclass(annotation, Record):
-        return f"table {annotation.__name__}"
+        return f"`{annotation.__name__}` table"
     return _WORDS.get(annotation, getattr(annotation, "__name__", str(annotation))) + after
+
+
+def _either(values: Iterable[str]) -> str:
+    """Alternatives in words."""
+    *first, last = values
+    return f"{', '.join(first)} or {last}" if first else last
+
+
+def _many(value: str) -> str:
+    """The plural of the words of a value."""
+    return re.sub(r"\b(list|number|string|table|value)\b", r"\1s", value).replace("quantity", "quantities")
 
 
 def _and_below(record: type[Record]) -> Iterator[type[Record]]:

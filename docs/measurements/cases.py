@@ -64,7 +64,7 @@ def _uncertainty_bands(file: str) -> str:
             f"{100 * one['first'][key]:.0f} / {100 * one['total'][key]:.0f} %" if one["first"] else "" for key in keys
         )
         rows.append((one["title"], *sizes, f"{100 * (one['error'] or 0):.2g} %", *shares))
-    return table(file, ("", "band, greatest width", "error bar", "error of the surrogate", *titles), rows)
+    return table(file, ("quantity", "band, greatest width", "error bar", "error of the surrogate", *titles), rows)
 
 
 def _uncertainty_candidates(file: str) -> str:
@@ -139,7 +139,9 @@ def _omission_rows() -> str:
         ]
         time = "" if one["time"] is None else f"{100 * one['time']:.0f} %"
         rows.append((name, *changes, time, one["verdict"] or one["status"]))
-    return table("effects", ("omitted", "surface, rms", "fibre length, rms", "volume", "remaining time", ""), rows)
+    return table(
+        "effects", ("omitted", "surface, rms", "fibre length, rms", "volume", "remaining time", "result"), rows
+    )
 
 
 def _study(found: dict[str, Any]) -> Any:

@@ -41,7 +41,7 @@ def _bodies_rows() -> str:
         said = _where(beside[one["name"]]), _rests(beside[one["name"]])
         rows.append((title, number(one["value"]), f"{one['ladder'][0][1]:.4g}", measured, *said))
     coarse = "on cells twice as large, in half the load steps"
-    head = ("", "shipped material", coarse, "measured; for the ball the fitted law", "", _RESTS)
+    head = ("body and quantity", "shipped material", coarse, "measured; for the ball the fitted law", "result", _RESTS)
     return table("bodies", head, rows)
 
 
@@ -145,7 +145,7 @@ def _credibility_cubes() -> str:
     laws = (
         f"{'best fit' if fit['converged'] else 'fit that did not converge'}: {fit['law']}" for fit in measured["fits"]
     )
-    return table("credibility", ("", "shipped material", "measured", "", _RESTS, *laws), rows)
+    return table("credibility", ("body and quantity", "shipped material", "measured", "result", _RESTS, *laws), rows)
 
 
 def _rests(one: dict[str, Any]) -> str:

@@ -23,7 +23,7 @@ def _solvers(found: dict[str, Any]) -> Any:
     return rows
 
 
-def _solvers_on_muscles(name: str, head: str) -> str:
+def _solvers_on_muscles(name: str) -> str:
     """A table of a time, or of one statistic in the worst frame, by solver and muscle; of the reference its error bars."""
     measured = kept("table_5_1")["measured"]
     cases = list(dict.fromkeys(one["case"] for one in measured))
@@ -34,7 +34,7 @@ def _solvers_on_muscles(name: str, head: str) -> str:
         rows.append(
             (kind, f"`{solver}`" + (", error bar" if solver == "reference" and name != PROCESSOR else ""), *cells)
         )
-    return table("table_5_1", ("", head, *(f"`{case}`" for case in cases)), rows)
+    return table("table_5_1", ("kind", "solver", *(f"`{case}`" for case in cases)), rows)
 
 
 def _cell(one: dict[str, Any] | None, name: str) -> str:
@@ -123,8 +123,8 @@ TABLES = {
     "standings_drawn_solvers": partial(_standings_rows, "standings_drawn"),
     "standings_drawn_parts": partial(_standings_parts, "standings_drawn"),
     "learned_solvers": _learned_rows,
-    "solvers_surface": partial(_solvers_on_muscles, "surface_deviation.rms", "surface, rms, mm"),
-    "solvers_fibres": partial(_solvers_on_muscles, "fibre_length.rms_percent", "fibre length, rms, %"),
-    "solvers_volume": partial(_solvers_on_muscles, "volume.deviation", "volume, %"),
-    "solvers_time": partial(_solvers_on_muscles, PROCESSOR, "processor time, s"),
+    "solvers_surface": partial(_solvers_on_muscles, "surface_deviation.rms"),
+    "solvers_fibres": partial(_solvers_on_muscles, "fibre_length.rms_percent"),
+    "solvers_volume": partial(_solvers_on_muscles, "volume.deviation"),
+    "solvers_time": partial(_solvers_on_muscles, PROCESSOR),
 }

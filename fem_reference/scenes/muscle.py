@@ -90,7 +90,7 @@ class CaseBox(Record):
 
 
 class CaseSphere(Record):
-    """A ball of ``radius`` about ``centre``."""
+    """A sphere of ``radius`` about ``centre``."""
 
     centre: Point
     radius: PositiveLength

@@ -20,7 +20,7 @@ __all__ = ["check", "choice", "find", "in_table", "names", "offers", "settings",
 
 def names(task: Task | None = None) -> list[str]:
     """The names of all solvers in scene files, or of those for a ``task``."""
-    # Without modules that serve solvers but are none.
+    # Without modules that only serve solvers.
     found = [name for name in modules.names(__path__) if name != "common" and not name.endswith("_kernels")]
     return [name for name in found if task is None or any(offer.task == task for offer in offers(name))]
 

@@ -36,17 +36,17 @@ _NO_AREA = 1e-6
 
 
 class ArapSettings(Record):
-    """The settings of the alternation; every key but ``tolerance`` is required.
+    """Settings of the alternation of local and global steps; every key except ``tolerance`` is required.
 
     ``weights`` of edges: "cotangent" (eq. 5.13), "clamped cotangent" (negative weights set to 0), "kirchhoff" (all 1), "tutte"
     (kirchhoff, each row divided by its diagonal). A cotangent weight is negative if the angles opposite its edge sum to more than
     pi. If such weights are kept, as in libigl, a half turn of a cell may lower the energy, so rest is unstable. ``fixed``: the rows
-    and columns of attached vertices are removed ("remove"), or only the columns, and all rows are solved by least squares ("ols",
-    eq. 5.12). With removed rows, tutte gives the same states as kirchhoff. ``rotations``: fitted before "each" global step, or once
-    in a frame ("first only"): later iterations then change nothing. ``volume_step``: after each global step the free vertices are
-    scaled by eq. 5.9 about the mean of all vertices. ``iterations``: in each frame; without a ``tolerance`` their number determines
-    the result. With a ``tolerance`` [mm] a frame ends as soon as no vertex moves farther than this in an iteration; a run with a
-    frame that needs more iterations is out of steps.
+    and columns of attached vertices are removed ("remove"), or only the columns are removed and all rows are solved by least
+    squares ("ols", eq. 5.12). With removed rows, tutte gives the same states as kirchhoff. ``rotations`` are fitted before "each"
+    global step, or once in a frame ("first only"), in which case later iterations change nothing. ``volume_step``: after each
+    global step the free vertices are scaled by eq. 5.9 about the mean of all vertices. ``iterations``: their number in each frame,
+    which determines the result if there is no ``tolerance``. With a ``tolerance`` [mm] a frame ends as soon as no vertex moves
+    farther than this in an iteration; if a frame needs more iterations, the run ends ``out of steps``.
     """
 
     weights: Weights
@@ -157,7 +157,7 @@ class Alternation(MovingSurface):
         done = f"{frames} frames in {self.cost['local_global_steps']:.0f} iterations"
         if missed := self.cost["frames_off_tolerance"]:
             advice = "more iterations or a larger tolerance may help"
-            return Outcome("out of steps", f"{done}, {missed:.0f} did not meet the tolerance; {advice}")
+            return Outcome("out of steps", f"{done}, of which {missed:.0f} did not meet the tolerance; {advice}")
         return Outcome("converged", done)
 
 
@@ -190,7 +190,7 @@ def alternate[S: Record](make: Callable[[Setup, S], Alternation], setup: Setup, 
     """Move the attached vertices and relax the others, frame number by frame number."""
     model = timed(make, setup, settings)
     if len(loose := model.system.loose):
-        why = f"vertex {loose[0]}: nothing but triangles without area or weight ties it to an attached vertex"
+        why = f"vertex {loose[0]}: only triangles without area or weight connect it to an attached vertex"
         hint = "kirchhoff weights do not depend on areas"
         return refused(model, setup.frames[0], sink, Trouble("diverged", f"{why}; {hint}"))
     return follow(model, setup, sink)

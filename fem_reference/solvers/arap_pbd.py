@@ -33,7 +33,7 @@ _KEPT = 1e-6
 
 
 class Projections(Record):
-    """PBD's projections after ARAP: how many ``sweeps`` over all constraints, and their stiffnesses as in ``pbd``."""
+    """Projections of PBD after ARAP: the number of ``sweeps`` over all constraints, and stiffnesses as in ``pbd``."""
 
     sweeps: Annotated[int, Field(gt=0)]
     stretch: Stiffness
@@ -42,10 +42,10 @@ class Projections(Record):
 
 
 class ArapPbdSettings(Record):
-    """Settings of ARAP, with the rows of attached vertices removed and rotations fitted in each iteration, and of its volume.
+    """Settings of ARAP with preserved volume; rows of attached vertices are removed, and each iteration fits the rotations.
 
-    ``weights``, ``iterations`` and ``tolerance``: as in ``arap``; "tutte" is not offered, as with removed rows it gives the states
-    of "kirchhoff". ``volume_constraint``: minimise the energy at the rest volume. ``projections``: none by default.
+    ``weights``, ``iterations`` and ``tolerance``: as in ``arap``; "tutte" is not offered, as with removed rows it gives the same
+    states as "kirchhoff". ``volume_constraint``: minimise the energy at the rest volume. ``projections``: PBD after ARAP, or none.
     """
 
     weights: Symmetric
@@ -90,11 +90,11 @@ def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest
             moved = at_volume(system, minimum, points, rest)
         count, met, points = count + 1, tolerance is not None and farthest(moved - points) <= tolerance, moved
         if (far := farthest(moved - minimum)) > np.cbrt(rest.six_volumes / 6):
-            why = f"the nearest positions of the volume at rest are {far:.3g} mm away"
+            why = f"the nearest positions with the volume at rest are {far:.3g} mm away"
             return Relaxed(points, count, False, Trouble("diverged", why))
     ratio = volume(points, rest.triangles)[0] / rest.six_volumes
     kept = not settings.volume_constraint or abs(ratio - 1) <= _KEPT
-    lost = Trouble("diverged", f"no multiplier keeps the volume, it is {ratio:.6g} of that at rest")
+    lost = Trouble("diverged", f"no multiplier preserves the volume, which is {ratio:.6g} of the volume at rest")
     return Relaxed(points, count, met or tolerance is None, None if kept else lost)
 
 

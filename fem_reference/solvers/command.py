@@ -45,10 +45,10 @@ Value = int | float | str
 class CommandSettings(Record):
     """The command line, with a value for each setting that it contains.
 
-    ``unit``: the unit of length of its frames, by default the unit in a ``candidate.toml`` beside them, otherwise mm. ``version``:
-    the version of the program. ``files``: further files and folders that determine its results, besides those in the command.
-    ``moves``: the mesh whose points the program moves. ``time_limit``: of processor time. ``directory``: its working directory.
-    ``ladder``: useful values of settings, from the fastest to the most accurate.
+    ``unit``: the unit of length of the frames, by default the unit in a ``candidate.toml`` beside them, otherwise mm. ``version``:
+    the version of the program. ``files``: files and folders that determine the results, in addition to those named in the command.
+    ``moves``: the mesh whose points the program moves. ``time_limit``: the limit on processor time. ``directory``: the working
+    directory. ``ladder``: useful values of settings, from the fastest to the most accurate.
     """
 
     model_config = ConfigDict(protected_namespaces=())
@@ -203,7 +203,7 @@ class CommandSolver(MuscleSolver[CommandSettings]):
         return create_model(self.settings.__name__, __base__=self.settings, __doc__=self.settings.__doc__, **fields)
 
     def moved(self, settings: CommandSettings) -> Moves:
-        """The carrier that the settings state."""
+        """The carrier of the unknowns that the settings state."""
         return settings.moves
 
     def fills(self, settings: CommandSettings) -> bool:  # noqa: ARG002
@@ -226,7 +226,7 @@ def _check_program(command: str, directory: Path, place: str) -> None:
 def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outcome:
     """Run the command and read the frames that it wrote. A failure is a status; frames before it are kept."""
     if problem.start is not None:
-        raise InputError("command", "a body that does not start at rest", "one that does: an export has no other start")
+        raise InputError("command", "a body that does not start at rest", "a body at rest, as an export begins there")
     with scratch_folder() as folder:
         places = {name: folder / name for name in FOLDERS}
         for place in places.values():
@@ -243,7 +243,7 @@ def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outc
 def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended, out: Path, sink: Sink) -> Outcome:
     """The outcome of a program that ``ended``, and its frames up to the first missing or damaged one; InputError if it refused."""
     if ended.code == REFUSED:
-        raise InputError("command", ended.said or f"exit status {REFUSED}", "a scene that the program takes")
+        raise InputError("command", ended.said or f"exit status {REFUSED}", "a scene that the program supports")
     free = len(problem.surface.points) - len(np.unique(problem.attached_vertices))
     unknowns = 3.0 * (free if settings.moves == "surface" else len(problem.mesh.points))
     cost = {"seconds": ended.seconds, "seconds_solve": ended.seconds, "seconds_processor": ended.processor}

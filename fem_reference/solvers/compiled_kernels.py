@@ -46,7 +46,7 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
 
 @cache
 def can_keep(folder: Path) -> bool:
-    """True if files can be written in a folder, which is created; False for a relative one, as of a user without a home."""
+    """True if files can be written in a folder, which is created; False for a relative path, as for a user without a home."""
     if not folder.is_absolute():
         return False
     try:

@@ -29,11 +29,11 @@ from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
 
 
 class LineSettings(Record):
-    """Points through which and obstacles around which lines go; without any key lines are straight.
+    """Points through which lines pass, and obstacles around which they wrap; without any key, lines are straight.
 
-    ``via``: points in the order in which a fibre passes them. ``via_count``: instead, a number of points evenly spread over each
-    fibre, each on the bone of the nearer end. ``obstacle``: surfaces around which each segment between two fixed points goes if the
-    straight path would cross them. ``hill``: forces of the lines.
+    ``via``: points in the order in which a fibre passes them. ``via_count``: instead of ``via``, a number of points spread evenly
+    over each fibre, each on the bone of the nearer end. ``obstacle``: surfaces around which a segment between two fixed points
+    wraps if the straight path would cross them. ``hill``: forces of the lines.
     """
 
     via: tuple[Via, ...] = ()
@@ -135,7 +135,7 @@ def _on_bones(
 ) -> dict[str, float]:
     """The force [N] and, about the origin, the moment [N mm] on each bone by lines of these ``tensions`` (k,) [N].
 
-    A part pulls along itself at both of its ends; an obstacle bears the pulls of both sides, as the line has no weight.
+    A part pulls at both of its ends, along its direction; an obstacle bears the pulls of both sides, as the line has no weight.
     """
     fixed, on_bone = passed.points, passed.on
     pulls = np.repeat(tensions, fixed.shape[1] - 1)[:, None]

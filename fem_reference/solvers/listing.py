@@ -1,8 +1,8 @@
 """The report's Octave listings (4.1 on an interval, 4.5 on triangles): their results, even if the report's text differs.
 
-Listings 4.1, 4.2, 4.4 and 4.5 are transcribed. Vertices are numbered from 0 here and from 1 there. ``bounds`` (2, m) is the
-listings' list of Dirichlet conditions: a row of vertices and a row of values. Lengths have any unit, or none: only the directions
-of the edges of a mesh count. validation/octave has the listings as run, their results, and the reading of each misprint.
+Listings 4.1, 4.2, 4.4 and 4.5 are transcribed. Vertices are numbered from 0 here and from 1 in the listings. ``bounds`` (2, m) is
+the listings' list of Dirichlet conditions: a row of vertices and a row of values. Lengths have any unit, or none: only the
+directions of the edges of a mesh count. validation/octave has the listings as run, their results, and the reading of each misprint.
 """
 
 import time
@@ -25,13 +25,13 @@ SQUARE, LINEAR, CONSTANT = 26.0, 2.0, 0.05
 
 
 class ListingSettings(Record):
-    """``peclet``: the argument of listing 4.1, by default 1 as in its header; listing 4.5 has no argument."""
+    """``peclet``: the Peclet number, the argument of listing 4.1, by default 1 as in its header; listing 4.5 has no argument."""
 
     peclet: float | None = Field(default=None, gt=0)
 
 
 def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outcome:
-    """The listing for the problem's domain, from its mesh and fixed values; effects and slopes are the listing's own.
+    """The result of the listing for the problem's domain, with its mesh and fixed values, and the listing's own effects and slopes.
 
     Listing 4.5 draws minus the norm of its vector unknown: that is the field here, and the vector is its ``components``.
     """
@@ -74,7 +74,7 @@ def fem1d(nodes: Floats, peclet: float) -> Floats:
 
     ``diff_op = -peclet K`` with K the stiffness matrix of linear elements, and the source 1 is divided by ``peclet``: it
     solves ``peclet psi'' = 1 / peclet``, ``peclet psi'(1) = -1``. On (0, 1) the values at the nodes are exact for any nodes:
-    ``psi = x^2 / (2 peclet^2) - x (1 / peclet + 1 / peclet^2)``, which is eq. 4.10 at 1. There is no advection.
+    ``psi = x^2 / (2 peclet^2) - x (1 / peclet + 1 / peclet^2)``, which is eq. 4.10 for a ``peclet`` of 1. There is no advection.
     """
     steps = np.diff(nodes)
     if len(steps) == 0 or not (steps > 0).all():
@@ -94,8 +94,8 @@ def first_derivative(triangles: Ints, points: Floats) -> Any:
     """Listing 4.2: the sparse matrix A (n dim, n dim) over ``triangles`` (m, 3) of ``points`` (n, dim), dim by dim for each vertex.
 
     For every edge of every triangle, with d its direction: ``d d^T`` is added to the blocks of both its ends and subtracted from
-    the two blocks between them. A is no derivative: ``u^T A u = sum over edges of w (d . (u_s - u_t))^2`` is twice the energy of
-    springs along the edges, all of one stiffness for any length, w = 2 inside and 1 at the rim.
+    the two blocks between them. A is not a differential operator: ``u^T A u = sum over edges of w (d . (u_s - u_t))^2`` is twice
+    the energy of springs along the edges, all of one stiffness for any length, w = 2 inside and 1 at the rim.
     """
     dim = points.shape[1]
     s, t = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
@@ -103,7 +103,7 @@ def first_derivative(triangles: Ints, points: Floats) -> Any:
     lengths = np.linalg.norm(d, axis=1)
     if not (lengths > 0).all():
         edge = int(np.argmin(lengths > 0))
-        got = f"vertices {s[edge]} and {t[edge]} of one edge at one place"
+        got = f"vertices {s[edge]} and {t[edge]} of one edge at the same place"
         raise InputError("points", got, "edges with a direction")
     d /= lengths[:, None]
     dj = d[:, :, None] * d[:, None, :]

@@ -1,9 +1,9 @@
 """A mass-spring system: report section 5.5.1, eqs 5.3 to 5.7.
 
-A volumetric model, as in Table 5.1: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses sample
-fibres and are joined to masses nearby; here the mesh defines the springs.) The masses carry the surface and the fibres. Springs
-resist neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is ignored. Contact
-acts on the masses of the surface only: the surface between them may be inside a bone.
+A volumetric model, as in Table 5.1: the masses are the points of the tetrahedra, and the springs are their edges. (Janak's masses
+sample fibres and are joined to masses nearby; here the mesh defines the springs.) The masses carry the surface and the fibres.
+Springs resist neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is ignored.
+Contact acts on the masses of the surface only: the surface between them may be inside a bone.
 """
 
 import math
@@ -47,13 +47,13 @@ def _damping(text: object) -> float | str:
 
 
 class MassSpringSettings(Record):
-    """Stiffness and density of the muscle, and the time of the solver.
+    """Stiffness and density of the muscle, and times of the solver.
 
-    ``stiffness``: of every spring. ``density``: of the muscle. All masses are equal: equilibrium does not depend on masses, and a
-    small mass would make every time step small. ``frame_time``: the solver's time between successive frame numbers; the longer it
-    is, the nearer the muscle is to equilibrium. The scene's interval applies to the reference and to recorded sequences.
+    ``stiffness``: of every spring. ``density``: of the muscle. All masses are equal, as equilibrium does not depend on masses and a
+    single small mass would make every time step small. ``frame_time``: the solver's time between successive frame numbers; the
+    longer it is, the nearer the muscle is to equilibrium. The scene's interval applies to the reference and to recorded sequences.
     ``damping``: the coefficient c, or ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an acceleration, by default
-    none. ``collision``: contact with bones at every step, by default none. ``time_step``: the longest, by default a stable one.
+    none. ``collision``: contact with bones at every step, by default none. ``time_step``: the longest, by default a stable step.
     """
 
     stiffness: Stiffness
@@ -107,8 +107,8 @@ def stable_time_step(network: Network, fixed: Ints) -> float:
 
 
 class MassSpringModel:
-    """A muscle as masses and springs that go from frame number to frame number: its ``network``, the ``fixed`` masses (k,), and the
-    bones with which the others collide. Masses are at ``points`` (n, 3) [mm]; a step before they were at ``previous``.
+    """A muscle as masses and springs, advanced by frame numbers: its ``network``, the ``fixed`` masses (k,), and the bones with
+    which the other masses collide. Masses are at ``points`` (n, 3) [mm]; one step earlier they were at ``previous``.
     """
 
     def __init__(self, problem: MuscleProblem, settings: MassSpringSettings) -> None:
@@ -131,7 +131,7 @@ class MassSpringModel:
         self.time_step = settings.frame_time / self.steps
         self.advice = "a longer frame_time or more damping may help"
         if self.time_step > stable:
-            self.advice = f"the time step of {self.time_step:.3g} s is above the stable one of {stable:.3g} s"
+            self.advice = f"the time step of {self.time_step:.3g} s is longer than the stable step of {stable:.3g} s"
         free = len(self.points) - len(self.fixed)
         self.cost: dict[str, float] = {"unknowns": 3.0 * free, "time_steps": 0}
 
@@ -183,13 +183,13 @@ class MassSpringModel:
     def ending(self) -> Outcome:
         """Converged; the message counts inverted tetrahedra and notes a ``frame_time`` that differs from the scene's interval."""
         frames, count, tets = self.problem.frames, self._inverted(), len(self.problem.mesh.tets)
-        done = f"{frames[-1] - frames[0]} frame numbers of {self.steps} steps of {self.time_step:.3g} s"
+        done = f"{frames[-1] - frames[0]} frame numbers, each of {self.steps} steps of {self.time_step:.3g} s"
         note = f"; {count} of {tets} tetrahedra are inside out at the last frame" if count else ""
         return Outcome("converged", done + note + other_clock(self.problem, self.settings.frame_time))
 
 
 def solve(problem: MuscleProblem, settings: MassSpringSettings, sink: Sink) -> Outcome:
-    """Step from rest at the first of ``problem.frames`` to the last of them; each frame wanted goes into ``sink``."""
+    """Step from rest at the first of ``problem.frames`` to the last of them; each requested frame goes into ``sink``."""
     quick = settings.model_copy(update={"time_step": settings.frame_time})
     model = timed(MassSpringModel, problem, settings, quick)
     if model.wanted <= _MOST_STEPS:
@@ -199,7 +199,7 @@ def solve(problem: MuscleProblem, settings: MassSpringSettings, sink: Sink) -> O
         stiffness, damping = model.network.stiffness, model.network.damping
         what = f"a stiffness of {stiffness:.3g} N/mm and a damping of {damping:.3g} N s/mm need "
         helps = "a lower stiffness, less damping, a greater density or a shorter frame_time may help"
-    why = f"{what}{model.wanted:.3g} steps in a frame number, at most {_MOST_STEPS}; {helps}"
+    why = f"{what}{model.wanted:.3g} steps for each frame number, but at most {_MOST_STEPS} are allowed; {helps}"
     return refused(model, problem.frames[0], sink, Trouble("out of steps", why))
 
 

@@ -29,7 +29,7 @@ _AS_NEAR = 1e-9
 
 
 class PbdCollision(Record):
-    """Contact of bones with free vertices. ``gap`` [mm]: the least distance of vertices, or their distance at rest if less;
+    """Contact of bones with free vertices. ``gap`` [mm]: the least distance of a vertex, or its distance at rest if that is less;
     ``stiffness``: the share of the displacement out of a bone that one projection applies.
     """
 
@@ -38,14 +38,14 @@ class PbdCollision(Record):
 
 
 class PbdSettings(Record):
-    """The settings of the algorithm; every key is required except the keys that turn an effect on.
+    """Settings of the algorithm; every key is required except the keys that add an effect.
 
-    ``sub_iterations``: steps of the algorithm in each iteration, 3 in report 6.1. ``solver_iterations``: sweeps over all
-    constraints in each step (line 15). ``damping``: share of every velocity that is lost in a step (line 8). ``stretch``,
-    ``volume``, ``bending``: stiffness of edge lengths, enclosed volume and dihedral angles: the share of an error that one
-    projection removes, from 0 (constraint off) to 1.
+    ``sub_iterations``: steps of the algorithm in each iteration, 3 in section 6.1 of the report. ``solver_iterations``: sweeps over
+    all constraints in each step (line 15). ``damping``: the share of every velocity that is lost in a step (line 8). ``stretch``,
+    ``volume``, ``bending``: the stiffness of edge lengths, enclosed volume and dihedral angles, which is the share of an error that
+    one projection removes, from 0 (constraint off) to 1.
 
-    ``anisotropy`` a: edges have the stiffness ``stretch (1 - a |cos|)``, with the angle to the nearest fibre at rest; 1 in the
+    ``anisotropy`` a: edges have the stiffness ``stretch (1 - a |cos|)``, with the angle to the nearest fibre at rest; a = 1 in the
     report's program with fibres. ``collision``: contact with bones (lines 12 to 14).
     """
 
@@ -125,7 +125,7 @@ def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
 
 
 def solve(setup: Setup, settings: PbdSettings, sink: Sink) -> Outcome:
-    """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
+    """Iterate from rest at the first of ``setup.frames`` to the last of them; each requested frame goes into ``sink``."""
     return follow(timed(PbdSurface, setup, settings), setup, sink)
 
 

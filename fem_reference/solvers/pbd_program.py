@@ -57,13 +57,13 @@ DIGITS = 12
 
 
 class ProgramSettings(Record):
-    """The settings of the program; every key is required except the keys that turn an effect on.
+    """Settings of the program; every key is required except the keys that add an effect.
 
-    ``sub_iterations``: steps in each iteration, 3 in report 6.1. ``damping``: share of every velocity that is lost in a step,
-    0.01 in the program. ``bending``: factor of the correction of a dihedral angle, 0.9 in the program. ``voxels``: their number
-    along each side of a bone's box, 64 in the program; without it there is no contact. ``anisotropy`` a: the stiffness of an edge
-    is (1 - |cos|)^a of its angle to the nearest fibre, a = 1 in the program; without the key the stiffness is 1, as in the
-    program without fibres.
+    ``sub_iterations``: steps in each iteration, 3 in section 6.1 of the report. ``damping``: the share of every velocity that is
+    lost in a step, 0.01 in the program. ``bending``: a factor on the correction of a dihedral angle, 0.9 in the program.
+    ``voxels``: their number along each side of a bone's bounding box, 64 in the program; without this key there is no contact.
+    ``anisotropy`` a: the stiffness of an edge is (1 - |cos|)^a, with its angle to the nearest fibre, and a = 1 in the program;
+    without this key the stiffness is 1, as in the program without fibres.
     """
 
     sub_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10))]
@@ -171,7 +171,7 @@ def constraints_of(setup: Setup, settings: ProgramSettings) -> PbdConstraints:
 
 
 def solve(setup: Setup, settings: ProgramSettings, sink: Sink) -> Outcome:
-    """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
+    """Iterate from rest at the first of ``setup.frames`` to the last of them; each requested frame goes into ``sink``."""
     return follow(timed(ProgramSurface, setup, settings), setup, sink)
 
 

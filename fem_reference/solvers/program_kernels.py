@@ -1,6 +1,6 @@
 """The report's own program, compiled, with its order of summation. It only opens folds, and its bones are voxels.
 
-All of it follows the program's source. As the result is chaotic, the last digit counts: each sum has the order that gcc 12 produces
+The code follows the program's source. As the result is chaotic, the last digit matters: each sum has the order that gcc 12 produces
 with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than SSE2), as
 found in the machine code. Do not simplify the sums. Arrays that are not writable and C-contiguous are compiled separately.
 """
@@ -13,7 +13,7 @@ from fem_reference.foundations.mesh import Bools, Floats, Ints
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import Vector, at, cross, dot, minus, move, times
 
-# Pairs of triangles whose normals have a cosine of greater magnitude than this are left as they are.
+# Pairs of triangles whose normals have a cosine of greater magnitude than this are not changed.
 FLAT_COSINE = 1 - 1e-10
 # A fold is corrected only if the ratio of the correction to its gradient is in this range.
 SMALLEST_RATIO, GREATEST_RATIO = 0.1, 10.0
@@ -102,8 +102,8 @@ def _turn(point: Vector, other: Vector, own: Vector, cosine: float) -> Vector:
 
 @compiled
 def _gradients(e: Vector, a: Vector, b: Vector) -> tuple[float, Vector, Vector, Vector, Vector]:
-    """Cosine of the normals of triangles (0, e, a) and (0, e, b), and the q of Mueller 2007, appendix A, that belong to 0, e, a
-    and b: minus its gradients [1/mm], at e plus.
+    """Cosine of the angle between the normals of triangles (0, e, a) and (0, e, b), and the q of Mueller 2007, appendix A, at 0, e,
+    a and b: the gradients [1/mm] with a minus sign, but a plus sign at e.
 
     For the last component at e the compiler sums the norms of the normals in another order.
     """
@@ -161,7 +161,7 @@ def _unit_normal(a: Vector, b: Vector) -> Vector:
 
 @compiled
 def _is_inside(inside: Bools, place: Vector) -> bool:
-    """True if a ``place``, in voxels, lies in a voxel inside."""
+    """True if a ``place``, in voxels, lies in a voxel inside the bone."""
     x, y, z = place
     count = len(inside)
     return 0 <= x < count and 0 <= y < count and 0 <= z < count and inside[int(x), int(y), int(z)]
@@ -222,7 +222,7 @@ def flood(border: Bools) -> Bools:
 
 @compiled
 def are_inside(inside: Bools, places: Floats) -> Bools:
-    """True (n,) for ``places`` (n, 3), in voxels, that lie in a voxel inside."""
+    """True (n,) for ``places`` (n, 3), in voxels, that lie in a voxel inside the bone."""
     found = np.empty(len(places), np.bool_)
     for i in range(len(places)):
         found[i] = _is_inside(inside, at(places, i))

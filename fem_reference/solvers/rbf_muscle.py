@@ -1,15 +1,15 @@
-"""An implicit muscle of few Gaussians that move with the bones: the goal of section 7.1 of the report.
+"""An implicit muscle of a few Gaussians that move with the bones: the goal of section 7.1 of the report.
 
-The surface at rest is fitted by Gaussians, four numbers each (``geometry.gaussian_surface``). At each frame number
+The surface at rest is fitted by Gaussians with four parameters each (``geometry.gaussian_surface``). At each frame number
 
-- the centres, and a few points of each attachment that move with its bone, are as rigid as possible among their neighbours (eq.
-  5.10 on a graph of tens of nodes);
-- centres are pushed away from bones that the surface has entered, and vertices that are still inside are moved out;
-- each radius shrinks by the square root of the stretch along the muscle around its centre, as stretched fibres become thin; all
+- the centres, and a few points of each attachment that move with its bone, move as rigidly as possible relative to their neighbours
+(eq. 5.10 on a graph of tens of nodes); - centres are pushed away from bones that the surface has entered, and vertices that are
+still inside are moved out; - each radius shrinks by the square root of the stretch along the muscle around its centre, as stretched
+fibres become thin; all
   radii are scaled together until the enclosed volume is the rest volume.
 
-A vertex moves with the Gaussians that form the surface around it, and is then moved to its level at rest, so the error of the fit
-does not change. Attached vertices are exact.
+A vertex moves with the Gaussians that form the surface around it, and is then moved to the level of the implicit function that it
+had at rest, so the error of the fit does not change. Attached vertices are exact.
 """
 
 from dataclasses import dataclass
@@ -41,8 +41,8 @@ _PUSHES, _SCALINGS = 4, 3
 
 
 class RbfSettings(Record):
-    """``gaussians``: their number; each has four parameters. ``iterations``: local and global steps of a frame number. ``volume``:
-    keep the volume by a change of radii. ``contact``: avoid bones; by default off.
+    """``gaussians``: their number; each has four parameters. ``iterations``: local and global steps for each frame number.
+    ``volume``: preserve the volume by changing the radii. ``contact``: avoid bones; by default off.
     """
 
     gaussians: Annotated[int, Field(ge=2), Trade((10, 30, 100))]
@@ -76,11 +76,11 @@ class Cloud:
         cells = VertexCells(nodes, starts, neighbours, np.ones(len(neighbours)))
         system = GlobalStep.of(cells, np.arange(free, count), "remove")
         if len(system.loose):
-            raise InputError("gaussians", f"{free}, some not connected to any attachment", "more, or fewer")
+            raise InputError("gaussians", f"{free}, some not connected to any attachment", "more Gaussians, or fewer")
         return Cloud(nodes, free, cells, system)
 
     def gradients(self, now: Floats) -> Floats:
-        """Sums (k, 3, 3) of edge now times edge at rest, around each node."""
+        """Sums (k, 3, 3) of the products of present edges and edges at rest, around each node."""
         one, other = np.repeat(np.arange(len(now)), np.diff(self.cells.starts)), self.cells.neighbours
         found = np.zeros((len(now), 3, 3))
         np.add.at(found, one, (now[one] - now[other])[:, :, None] * (self.nodes[one] - self.nodes[other])[:, None])

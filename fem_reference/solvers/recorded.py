@@ -44,10 +44,10 @@ ABOUT = "candidate.toml"
 
 
 class RecordedSettings(Record):
-    """The place of the sequence, and its unit of length.
+    """Location of the sequence, and its unit of length.
 
-    ``folder``: a folder with one mesh file for each frame, numbered by the last digits of the name; a .pvd or .xdmf file or a
-    folder with one; or the folder of a stored run.
+    ``folder``: a folder with one mesh file for each frame, numbered by the last digits of its name; a .pvd or .xdmf file, or a
+    folder that contains one; or the folder of a stored run.
     """
 
     folder: str
@@ -56,8 +56,8 @@ class RecordedSettings(Record):
 
 class About(Record):
     """The contents of ``candidate.toml``: who computed the sequence, its unit of length, the time [s] to solve one frame, the
-    number of threads, and the parts of the scene ``left_out``, in words. For standings: the ``group`` of its method, the ``case``,
-    the key ``scene`` that its export states, and the ``sha256`` of each file by name, which is checked.
+    number of threads, and the parts of the scene ``left_out``, in words. For standings: the ``group`` of the method, the ``case``,
+    the key ``scene`` that the export states, and the ``sha256`` of each file by name, which is checked.
     """
 
     name: FileName | None = None
@@ -73,7 +73,7 @@ class About(Record):
 
     @property
     def lacks(self) -> str:
-        """The end of a sentence with the parts left out; empty if there are none."""
+        """The end of a sentence that lists the omitted parts; empty if there are none."""
         return f"; left out: {', '.join(self.left_out)}" if self.left_out else ""
 
     @field_validator("unit")
@@ -114,7 +114,7 @@ def origin(settings: RecordedSettings) -> dict[str, Any]:
 
 
 def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
-    """Pass on every frame wanted, once all are read and checked to be of this surface; the cost is from ``candidate.toml``."""
+    """Pass on every requested frame, once all are read and checked to be of this surface; the cost is from ``candidate.toml``."""
     folder = Path(settings.folder)
     said = checked_about(folder, settings.unit)
     frames = list(checked_frames(setup, folder, settings.unit))
@@ -126,8 +126,8 @@ def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
 
 
 def checked_frames(setup: Setup, folder: Path, unit: float) -> Iterator[Frame]:
-    """The frames wanted, one after the other, from the sequence in a ``folder``, in a ``unit`` [mm]; InputError at the first that
-    is missing or not of this surface.
+    """The requested frames, one after the other, from the sequence in a ``folder``, in a ``unit`` [mm]; InputError at the first
+    frame that is missing or not of this surface.
 
     The times of an index are times of frames by ``setup.interval`` [s], or frame numbers if the interval is None.
     """
@@ -138,7 +138,7 @@ def checked_frames(setup: Setup, folder: Path, unit: float) -> Iterator[Frame]:
         if number not in sequence:
             there = f"{min(sequence)} to {max(sequence)}" if sequence else "none"
             got = f"no frame {', '.join(missing)} (there are {len(sequence)}: {there})"
-            raise InputError(source, got, "every frame wanted")
+            raise InputError(source, got, "every requested frame")
         entry = sequence[number]
         surface = entry if isinstance(entry, Surface) else files.read_surface(entry, unit)
         positions = _positions(surface, setup.surface)

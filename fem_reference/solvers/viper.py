@@ -37,7 +37,7 @@ _AROUND, _CARRIERS = 6, 12
 class ViperSettings(Record):
     """``points``: their number in each rod. ``iterations``: sweeps over all constraints for each frame number. ``stretch``,
     ``bending``, ``volume``, ``bundle``: the stiffness of each kind of constraint in a sweep, from 0 (off) to 1. ``contact``: rods
-    keep a distance of their radius from bones, or their distance at rest, and the surface is moved out of bones; by default off.
+    stay their radius away from bones, or their distance at rest if less, and the surface is moved out of bones; by default off.
     """
 
     points: Annotated[int, Field(ge=4, le=1000), Trade((4, 6, 12))]
@@ -66,7 +66,7 @@ class Bundle:
         self.sizes = sizes[..., 0] - np.sum(self.means**2, axis=2)
 
     def goals(self, points: Floats, radii: Floats, frames: Floats) -> tuple[Floats, Floats]:
-        """The wanted points (k, p, 3) and radii (k, p) [mm], from the present ones with ``frames`` (k, p, 3, 3)."""
+        """The target points (k, p, 3) and radii (k, p) [mm], from the present ones with ``frames`` (k, p, 3, 3)."""
         now = (points - self.middle).swapaxes(0, 1)
         parts = now[..., None] * self.sections[..., None, :]
         parts += (self.radius * radii.T)[..., None, None] * frames.swapaxes(0, 1)
@@ -136,7 +136,7 @@ class Rods(MovingSurface):
         self.last = number
 
     def _moved(self, ends: Ints, number: int) -> tuple[Floats, Floats]:
-        """Points and turns as if each rod had moved with the bone at one of its ends, ``ends`` (k,), since the last number."""
+        """Points and turns if each rod had moved with the bone at one of its ends, ``ends`` (k,), since the last frame number."""
         points, turns = np.empty_like(self.rods), np.empty_like(self.turns)
         for n in np.unique(ends):
             bone = self.problem.bones[n]

@@ -32,7 +32,7 @@ from fem_reference.solvers.pbd_kernels import dihedrals, distances, pull_dihedra
 
 
 class XpbdCollision(Record):
-    """Contact of bones with free vertices. ``gap`` [mm]: the least distance of vertices, or their distance at rest if less;
+    """Contact of bones with free vertices. ``gap`` [mm]: the least distance of a vertex, or its distance at rest if that is less;
     ``stiffness`` [MPa/mm]: under a pressure p the surface comes nearer by p / stiffness.
     """
 
@@ -41,14 +41,14 @@ class XpbdCollision(Record):
 
 
 class XpbdSettings(Record):
-    """The settings of the method and of the muscle; every key is required except the keys that turn an effect on.
+    """Settings of the method and of the muscle; every key is required except the keys that add an effect.
 
-    ``frame_time`` [s]: the solver's time between successive frame numbers; the scene's interval is for the reference and recorded
-    sequences. ``sub_steps``: time steps in a ``frame_time``. ``sweeps``: over all constraints in each time step. ``density``
-    [t/mm3]: of the enclosed body; its mass is divided among the vertices in proportion to area.
+    ``frame_time`` [s]: the solver's time between successive frame numbers; the scene's interval applies to the reference and to
+    recorded sequences. ``sub_steps``: time steps in a ``frame_time``. ``sweeps`` over all constraints in each time step.
+    ``density`` [t/mm3] of the enclosed body; its mass is divided among the vertices in proportion to area.
 
-    ``stretch`` [N/mm]: the membrane's Young's modulus times thickness. ``bending`` [N mm]: the stiffness of a plate. ``volume``
-    [MPa]: bulk modulus of the enclosed body. ``damping`` [1/s]: rate of decay of velocities. ``collision``: contact with bones.
+    ``stretch`` [N/mm]: Young's modulus times thickness of a membrane. ``bending`` [N mm]: stiffness of a plate. ``volume`` [MPa]:
+    bulk modulus of the enclosed body. ``damping`` [1/s]: rate of decay of velocities. ``collision``: contact with bones.
     """
 
     frame_time: units.Time
@@ -174,7 +174,7 @@ def advance(
 
 
 def solve(setup: Setup, settings: XpbdSettings, sink: Sink) -> Outcome:
-    """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
+    """Iterate from rest at the first of ``setup.frames`` to the last of them; each requested frame goes into ``sink``."""
     outcome = follow(timed(XpbdSurface, setup, settings), setup, sink, settings.sub_steps)
     return replace(outcome, message=outcome.message + other_clock(setup, settings.frame_time))
 

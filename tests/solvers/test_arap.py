@@ -297,7 +297,7 @@ def test_a_tolerance_that_is_not_met_is_reported_at_the_end_and_all_frames_are_k
     outcome, frames = run(setup, tolerance="1e-6 mm")
     assert outcome.status == "out of steps"
     assert outcome.message.startswith(
-        "10 frames in 50 iterations, 10 did not meet the tolerance; more iterations or a larger tolerance may help"
+        "10 frames in 50 iterations, of which 10 did not meet the tolerance; more iterations or a larger tolerance may help"
     )
     assert outcome.cost["frames_off_tolerance"] == 10
     assert list(frames) == list(range(11))
@@ -351,7 +351,7 @@ def test_a_vertex_that_nothing_ties_is_an_outcome():
     setup = attached_setup(None, SWING, surface.moved_to(points))
     outcome, frames = run(setup)
     assert outcome.status == "diverged"
-    assert outcome.message.startswith(f"vertex {vertex}: nothing but triangles without area or weight ties it")
+    assert outcome.message.startswith(f"vertex {vertex}: only triangles without area or weight connect it")
     assert list(frames) == [0]
     assert run(setup, weights="kirchhoff")[0].status == "converged"
 

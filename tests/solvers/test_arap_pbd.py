@@ -184,7 +184,7 @@ def test_a_volume_out_of_reach_is_an_outcome():
     )
     outcome, frames = run(Setup(setup.surface, setup.bones, attached, setup.frames, None))
     assert outcome.status == "diverged"
-    assert outcome.message.startswith("frame 1: no multiplier keeps the volume, it is 1.")
+    assert outcome.message.startswith("frame 1: no multiplier preserves the volume, which is 1.")
     assert list(frames) == [0]
 
 
@@ -197,7 +197,7 @@ def pressed(travel):
 def test_a_volume_at_another_root_is_an_outcome():
     outcome, frames = run(pressed(45.0), iterations=3)
     assert outcome.status == "diverged"
-    assert outcome.message.startswith("frame 1: the nearest positions of the volume at rest are ")
+    assert outcome.message.startswith("frame 1: the nearest positions with the volume at rest are ")
     assert list(frames) == [0]
 
 
@@ -227,7 +227,7 @@ def test_a_tolerance_that_is_not_met_is_reported():
     setup = attached_setup(None, SWING, last=10)
     outcome, frames = run(setup, tolerance="1e-6 mm")
     assert outcome.status == "out of steps"
-    assert outcome.message.startswith("10 frames in 50 iterations, 10 did not meet the tolerance; ")
+    assert outcome.message.startswith("10 frames in 50 iterations, of which 10 did not meet the tolerance; ")
     assert list(frames) == list(range(11))
 
 

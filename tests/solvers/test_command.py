@@ -153,7 +153,7 @@ def test_the_time_of_frames_alone_is_what_the_program_states_unless_it_cannot_be
 
 def test_a_program_that_does_not_take_the_scene_is_not_one_that_crashed(bar, tmp_path) -> None:
     refuses = settings(tmp_path, program(tmp_path, "print('no tetrahedra'); sys.exit(77)"))
-    with pytest.raises(InputError, match="got no tetrahedra, want a scene that the program takes"):
+    with pytest.raises(InputError, match="got no tetrahedra, want a scene that the program supports"):
         solved(bar, refuses)
 
 

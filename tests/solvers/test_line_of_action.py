@@ -228,7 +228,7 @@ def test_too_few_points_and_no_attachment_are_refused() -> None:
         InputError, match="via: got fibre 0 of 2 points, want fibres of at least 3 points for 1 via-points"
     ):
         solved(bar(points=2), via=[{"at": 0.5, "bone": "top"}])
-    with pytest.raises(InputError, match="a muscle without attachments, want attachments that lines are fixed to"):
+    with pytest.raises(InputError, match="a muscle without attachments, want attachments to which lines are fixed"):
         solved(replace(bar(), attached=()))
 
 

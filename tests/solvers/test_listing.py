@@ -300,7 +300,7 @@ def test_peclet_that_is_not_positive(peclet):
 @pytest.mark.parametrize("place", [0.0, math.nan])
 def test_edge_without_a_direction(place):
     points = np.array([[1.0, 0], [0, 0], [place, 0]])
-    with pytest.raises(InputError, match="points: got vertices 1 and 2 of one edge at one place"):
+    with pytest.raises(InputError, match="points: got vertices 1 and 2 of one edge at the same place"):
         listing.first_derivative(np.array([[0, 1, 2]]), points)
 
 

@@ -124,7 +124,7 @@ def test_moved_with_both_its_bones_a_muscle_comes_to_rest_undeformed() -> None:
     # Swinging dies out with c / 2 m = 150 / s or more and 1.1 s are left: rounding of the forces.
     assert_allclose(frames[-1].surface, apply(turn.pose(5), given.surface.points), atol=1e-6)
     assert frames[-1].scalars["unbalanced_max"] < 1e-6
-    assert outcome.message.startswith("60 frame numbers of ")
+    assert outcome.message.startswith("60 frame numbers, each of ")
 
 
 @pytest.mark.slow
@@ -170,7 +170,7 @@ def test_bones_keep_masses_out() -> None:
 
 def test_cost() -> None:
     outcome, _ = solved(bar(BEND), time_step="1 ms", stiffness="0.001 N/mm")
-    assert outcome.message == "10 frame numbers of 20 steps of 0.001 s"
+    assert outcome.message == "10 frame numbers, each of 20 steps of 0.001 s"
     assert outcome.cost["iterations"] == 10
     assert outcome.cost["time_steps"] == 200
     assert outcome.cost["threads"] == 1
@@ -181,7 +181,7 @@ def test_cost() -> None:
 def test_above_the_stable_time_step_it_diverges_and_says_why() -> None:
     outcome, frames = solved(bar(BEND), time_step="2 ms", damping=None)
     assert outcome.status == "diverged"
-    assert "; the time step of 0.002 s is above the stable one of " in outcome.message
+    assert "; the time step of 0.002 s is longer than the stable step of " in outcome.message
     assert frames[0].number == 0
 
 
@@ -228,7 +228,10 @@ def test_single_tetrahedra_inside_out_are_reported() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"time_step": "1e-12 s"}, "2e+10 steps in a frame number, at most 100000; a longer time_step may help"),
+        (
+            {"time_step": "1e-12 s"},
+            "2e+10 steps for each frame number, but at most 100000 are allowed; a longer time_step may help",
+        ),
         ({"damping": "1e9 N s/m"}, "a stiffness of 1 N/mm and a damping of 1e+06 N s/mm need "),
         ({"stiffness": "1e9 N/mm"}, "a stiffness of 1e+09 N/mm and a damping of 2e-05 N s/mm need "),
     ],
@@ -266,7 +269,9 @@ def test_the_stable_time_step_at_great_damping(damping) -> None:
 
 def test_another_clock_than_the_scenes_is_reported() -> None:
     outcome, _ = solved(replace(bar(BEND), interval=0.5))
-    assert outcome.message.endswith("; its interval between frame numbers is 0.02 s, that of the scene 0.5 s")
+    assert outcome.message.endswith(
+        "; its interval between frame numbers is 0.02 s, and the interval of the scene is 0.5 s"
+    )
     assert "the scene" not in solved(replace(bar(BEND), interval=0.02))[0].message
 
 

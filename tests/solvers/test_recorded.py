@@ -230,7 +230,7 @@ def test_stl_corners_part_by_more_than_rounding(tmp_path: Path) -> None:
 
 def test_missing_frames_are_listed(tmp_path: Path) -> None:
     sequence(tmp_path, numbers=(0, 5, 15))
-    refuse(tmp_path, r"got no frame 10, 20 \(there are 3: 0 to 15\), want every frame wanted")
+    refuse(tmp_path, r"got no frame 10, 20 \(there are 3: 0 to 15\), want every requested frame")
 
 
 def test_a_folder_without_meshes(tmp_path: Path) -> None:

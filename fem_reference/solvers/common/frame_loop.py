@@ -43,7 +43,7 @@ class FrameModel(Protocol):
 
 
 def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> Outcome:
-    """Take a ``model`` from rest at the first frame of ``setup`` through every frame number to the last, each in ``per_frame``
+    """Advance a ``model`` from rest at the first frame of ``setup`` through every frame number to the last, each in ``per_frame``
     parts; bones take their poses at the end of each part. ``sink`` gets the frames. *Out of steps* if bones move too far in a part.
     """
     frames = setup.frames
@@ -71,8 +71,8 @@ def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
     thing, early, late = found
     return Trouble(
         "out of steps",
-        f"{thing.place} turns by more than a right angle, goes farther than the muscle is long, or goes there and back, "
-        f"between frames {early:g} and {late:g}, where this solver does not look; a slower motion, over more frames, helps",
+        f"{thing.place} turns by more than a right angle, moves farther than the length of the muscle, or moves out and back, "
+        f"between frames {early:g} and {late:g}, where this solver takes no step; a slower motion, over more frames, helps",
     )
 
 
@@ -83,7 +83,7 @@ def refused(model: FrameModel, first: int, sink: Sink, why: Trouble) -> Outcome:
 
 
 def each(model: FrameModel, numbers: Iterable[int], wanted: tuple[int, ...], sink: Sink) -> Outcome:
-    """Take ``model`` to the frame ``numbers`` one after the other; ``sink`` gets the ``wanted`` frames."""
+    """Advance ``model`` to the frame ``numbers`` one after the other; ``sink`` gets the ``wanted`` frames."""
     cost = _begun(model)
     for number in numbers:
         begin = time.perf_counter()
@@ -108,8 +108,8 @@ def _begun(model: FrameModel) -> dict[str, float]:
 def timed[M: FrameModel, S: Record](
     make: Callable[[Any, S], M], setup: Setup, settings: S, quick: S | None = None
 ) -> M:
-    """The model that ``make`` builds from ``setup`` and ``settings``, with its ``seconds_setup`` in the cost. Before, a frame of a
-    tetrahedron is solved, with ``quick`` settings if given, to compile every function, in ``seconds_compile``.
+    """The model that ``make`` builds from ``setup`` and ``settings``, with its ``seconds_setup`` in the cost. Before that, a frame
+    of a tetrahedron is solved, with ``quick`` settings if given, to compile every function, in ``seconds_compile``.
     """
     begin = time.perf_counter()
     first = make(tetrahedron(), quick or settings)
@@ -167,4 +167,4 @@ def other_clock(setup: Setup, frame_time: float) -> str:
     """A note if the interval [s] of the scene differs from a solver's ``frame_time`` [s]; empty otherwise."""
     if setup.interval is None or math.isclose(setup.interval, frame_time):
         return ""
-    return f"; its interval between frame numbers is {frame_time:g} s, that of the scene {setup.interval:g} s"
+    return f"; its interval between frame numbers is {frame_time:g} s, and the interval of the scene is {setup.interval:g} s"

@@ -78,7 +78,7 @@ class Hill(Record):
         pulls = np.array([self.imbalance(path, one, activation) for one in lengths.tolist()]) >= 0
         found = int(np.argmax(pulls))
         if found == 0:
-            want = "one on which fibres keep a tenth of their optimal length"
+            want = "a path on which fibres keep a tenth of their optimal length"
             raise InputError("hill", f"a path of {path:.4g} mm", want)
         bracket = lengths[found - 1], lengths[found]
         fibre = float(scipy.optimize.brentq(lambda one: self.imbalance(path, one, activation), *bracket, xtol=1e-13))
@@ -118,9 +118,9 @@ class Hill(Record):
 
 
 class HillSettings(Record):
-    """Lines as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1). ``max_force``: of all lines together.
-    ``fibre_share``: the optimal length of the fibres of a line over its length at the first frame, at which its tendon is just
-    slack; ``pennation``: the angle of the fibres; ``activation``: from 0 to 1.
+    """Settings of lines as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1). ``max_force`` of all lines
+    together. ``fibre_share``: the optimal fibre length of a line divided by its length at the first frame, at which its tendon is
+    just slack. ``pennation``: the angle between fibres and tendon. ``activation``: from 0 to 1.
     """
 
     max_force: Force

@@ -29,12 +29,12 @@ class CurvePoint(Record):
 
 
 class Via(Record):
-    """A point of every fibre that moves with a ``bone``. ``at``: its place at rest, as a share of the fibre's length.
+    """A point of every fibre, which moves with a ``bone``. ``at``: its place at rest, as a share of the fibre's length.
 
     ``within``: the least and the greatest angle of the ``joint`` at which lines pass through the point; at other angles they omit
-    it. ``curve``: its positions on the bone by the joint's angle, the same for all fibres. In between, the positions follow
-    Catmull-Rom splines, with the slopes of parabolas through neighbours; beyond the ends the nearest position is used. ``at`` then
-    only orders the points.
+    it. ``curve``: its positions on the bone at some angles of the joint, the same for all fibres. Between these angles the point
+    moves along Catmull-Rom splines, with the slopes of parabolas through neighbouring positions; beyond the ends it stays at the
+    last position. ``at`` then only determines the order of the points.
     """
 
     at: Annotated[float, Field(gt=0, lt=1)]
@@ -165,7 +165,7 @@ def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
 def nearest_bones(problem: MuscleProblem, points: Floats, place: str) -> Ints:
     """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
     if not problem.attached:
-        raise InputError(place, "a muscle without attachments", "attachments that lines are fixed to")
+        raise InputError(place, "a muscle without attachments", "attachments to which lines are fixed")
     ends = [problem.surface.points[attached.vertices] for attached in problem.attached]
     away = [np.linalg.norm(points[:, None] - end, axis=2).min(axis=1) for end in ends]
     found = [index(problem.bones, attached.bone.name, place) for attached in problem.attached]
@@ -176,6 +176,6 @@ def index(named: tuple[Bone, ...] | tuple[Joint, ...], name: str, place: str) ->
     """The index of the item with this ``name``; InputError at ``place`` if there is none."""
     names = [one.name for one in named]
     if name not in names:
-        want = f"one of {', '.join(names)}" if names else "a joint of the case, which has none"
+        want = f"one of {', '.join(names)}" if names else "a joint, but the case has none"
         raise InputError(place, f'"{name}"', want)
     return names.index(name)

@@ -50,10 +50,10 @@ class SurfaceCheck:
         """
         lost = np.flatnonzero(~np.isfinite(state).all(axis=1))
         if len(lost):
-            return Trouble("diverged", f"the position of {len(lost)} points is not a number (point {lost[0]} for one)")
+            return Trouble("diverged", f"the position of {len(lost)} points is not a number (first: point {lost[0]})")
         wide, apart = diagonal(state), diagonal(state[self.attached]) if len(self.attached) else 0.0
         if wide > _WIDE * max(self.width, apart):
-            return Trouble("diverged", f"the muscle is spread over {wide:.3g} mm, at rest {self.width:.3g} mm")
+            return Trouble("diverged", f"the muscle is spread over {wide:.3g} mm, but {self.width:.3g} mm at rest")
         ratio = enclosed_volume(state, self.rest.triangles) / self.volume
         if ratio <= 0:
             return Trouble("inverted", "the surface is turned inside out")

@@ -25,7 +25,7 @@ _TOUCHES = 1e-6
 
 
 class Ellipsoid(Record):
-    """An ellipsoid about ``centre`` with half axes ``radii`` along x, y, z, rotated by the rotation vector ``turn``."""
+    """An ellipsoid about ``centre`` with semi-axes ``radii`` along x, y, z, rotated by the rotation vector ``turn``."""
 
     centre: Point
     radii: tuple[PositiveLength, PositiveLength, PositiveLength]
@@ -33,7 +33,7 @@ class Ellipsoid(Record):
 
 
 class Torus(Record):
-    """A ring with a hole through which lines pass: a tube of radius ``tube`` about a circle of ``radius`` across ``axis``."""
+    """A ring with a hole through which lines pass: a tube of radius ``tube`` about a circle of ``radius`` around ``axis``."""
 
     centre: Point
     axis: Axis
@@ -44,9 +44,9 @@ class Torus(Record):
 
 
 class ObstacleOn(Record):
-    """One ``sphere``, ``cylinder``, ``ellipsoid`` or ``torus``, given at rest, that moves with a ``bone``.
+    """One ``sphere``, ``cylinder``, ``ellipsoid`` or ``torus``, placed at rest, which moves with a ``bone``.
 
-    ``start`` and ``end`` of a cylinder define its axis; the cylinder is infinite.
+    A cylinder is infinite; its ``start`` and ``end`` only define the axis.
     """
 
     bone: str

@@ -77,7 +77,7 @@ def go_on(problem: AnyMuscle, settings: Settings, sink: Sink, cut_off: CutOff) -
     there = kept(cut_off, problem.body)
     again = settings.reuse and not _has_steps(problem)  # whether earlier states are used again
     if there.frames:
-        log.info("begun before; continuing from the stored frames up to %d", there.frames[-1])
+        log.info("an earlier run was interrupted; continuing from its stored frames, up to frame %d", there.frames[-1])
 
     def pass_on(frame: Frame) -> None:
         sink(frame)
@@ -209,7 +209,7 @@ def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> 
 
 def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
     """The distance between attached surface vertices and their targets on the bones, ``attachment_error_rms`` and
-    ``attachment_error_max`` [mm]. The distance is not zero: exact attachments are facets of tets, which cover the vertices only
+    ``attachment_error_max`` [mm]. The distance is not zero, as exact attachments are facets of tets, which cover the vertices only
     roughly, and springs yield. Empty if nothing is attached.
     """
     surface = frame.surface
@@ -241,7 +241,7 @@ def _samples(problem: AnyMuscle) -> dict[str, tuple[Ints, Floats]]:
 
 
 def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
-    """The settings, with open values filled in from the size of the problem and the machine."""
+    """The settings, with missing values chosen for the size of the problem and the machine."""
     mesh, changes = problem.body.mesh, dict[str, int | bool]()
     check_element(
         settings.element, mesh.kind, mesh.degree, problem.body.effects, "element"
@@ -269,18 +269,18 @@ def _has_steps(problem: AnyMuscle) -> bool:
 def _check_touching(settings: Settings, place: str) -> None:
     """Raise InputError below ``place`` if the settings do not suit muscles that touch each other."""
     if (settings.ranks or 1) > 1:
-        want = "1, on which several muscles, or one that touches itself, are solved"
+        want = "1, as several muscles, or a muscle that touches itself, are solved on one rank"
         raise InputError(join(place, "ranks"), settings.ranks, want)
     if settings.linear_solver == "multigrid":
         raise InputError(
-            join(place, "linear_solver"), '"multigrid"', "another: its levels do not support touching muscles"
+            join(place, "linear_solver"), '"multigrid"', "another one, as this does not support touching muscles"
         )
 
 
 def _check_ranks(settings: Settings, place: str) -> None:
     """Raise InputError at ``place`` if multigrid is requested on more than one rank."""
     if settings.linear_solver == "multigrid" and (settings.ranks or 1) > 1:
-        raise InputError(place, settings.ranks, "1, on which multigrid works")
+        raise InputError(place, settings.ranks, "1, as multigrid works on one rank only")
 
 
 SOLVES = (

@@ -116,7 +116,7 @@ def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
     """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and the reason if there is none."""
     x = A.createVecRight()
     if not np.isfinite(A.norm() + b.norm()):
-        return x.array, "the equations have a number that is not finite: does a formula lack a value somewhere?"
+        return x.array, "the equations contain a number that is not finite; a formula may have no value somewhere"
     solver = PETSc.KSP().create(A.comm)
     solver.setOperators(A)
     solver.setType("preonly")

@@ -56,7 +56,7 @@ class Clock:
         self._set(unknowns, self._seconds(_INSTANT * self.whole))
 
     def begin(self, unknowns: Floats) -> None:
-        """End that instant with ``unknowns``: velocities are 0, and accelerations are now known."""
+        """End that step with ``unknowns``: velocities are 0, and accelerations are now known."""
         assert self.step is not None  # there is momentum
         moved = unknowns - self.step.before.x.array
         self.acceleration, self.resting = self.momentum.begun(moved, 1 / float(self.step.rate.value)), False

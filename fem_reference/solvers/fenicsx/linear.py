@@ -109,7 +109,7 @@ class Factorised:
         operations = self.factors.getMumpsRinfog(_FLOPS)
         self.spent.counts["factorisation_flops"] += operations
         counted = self.factors.getMumpsInfog(_ENTRIES)
-        entries = counted if counted > 0 else -1e6 * counted  # MUMPS gives a large number in millions, with a minus
+        entries = counted if counted > 0 else -1e6 * counted  # MUMPS gives a large number as minus its millions
         self.limit = int(min(max(operations / entries / _OPERATIONS, _LEAST), _MOST))
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:

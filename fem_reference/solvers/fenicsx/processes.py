@@ -143,7 +143,7 @@ class Process:
             elif passed >= longest:
                 why = (
                     f"stopped after {passed:.3g} s in which it had {used:.3g} s of processor time, of the {time_limit:g} s that "
-                    "it may take: the machine was busy, or a process waited; nothing follows about the solution"
+                    "it may take: the machine was busy, or a process waited; this allows no conclusion about the solution"
                 )
                 self.overran = "stalled", why
             elif done.wait(max(min(time_limit - used, longest - passed), _GLANCE)):

@@ -76,7 +76,7 @@ def planned[S: BodySettings](settings: S, cells: Cells, free: float) -> S:
         if needed <= free:
             return settings.model_copy(update={"linear_solver": kind, "precision": precision})
     got = f"{needed:.0f} MB for {count} unknowns ({kind})"
-    raise InputError("memory", got, f"at most the {free:.0f} MB free: larger cells")
+    raise InputError("memory", got, f"at most the {free:.0f} MB of free memory; larger cells need less")
 
 
 def _fitting(element: str, count: int) -> list[Literal["direct", "lagged", "multigrid"]]:

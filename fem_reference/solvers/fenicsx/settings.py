@@ -11,23 +11,23 @@ from fem_reference.solvers.common.protocol import Trade
 
 
 class BodySettings(Record):
-    """Numerics of a body; steps are in frame numbers.
+    """Numerical settings for a body; load steps are in frame numbers.
 
-    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step. It grows by half after an easy
-    step (at most 5 Newton iterations), up to ``largest_step`` if given, and is halved if Newton's method needs more than
-    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal forces and of
-    the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are integrated exactly on a
-    straight cell, by default as the element requires. ``linear_solver`` of Newton's method: ``"direct"``, a new factorisation and
-    an exact solution for each system; ``"lagged"``, inexact FGMRES preconditioned with a factorisation that is kept until a new one
-    is cheaper, and exact solutions before a run ends ``out of steps``; the default depends on the size. ``precision``: of
-    factorisations, by default double if direct and single if lagged. Both settings change the time but not the result. ``follow``:
-    ``"equilibrium"``, any that Newton's method finds, or ``"stable"``: at a frame with an unstable equilibrium (only if negative
-    modes are counted) the body is moved along its lowest mode by a ``perturbation``, a share of its size, and solved again; the
-    perturbation is reversed and enlarged, up to eight times, until there are fewer negative modes. ``reuse``: use the state of an
-    earlier frame with the same load again. ``time_limit``: the limit of processor time of a rank, by default none; after twenty
-    times this limit by the clock the status is *stalled*, which allows no conclusion. ``store_state``: each frame also stores the
-    unknowns of every cell, from which ``results`` evaluates stress, pressure, det F and fibre stretch; by default only for a muscle
-    whose frames together take at most 64 MB.
+    ``element``: one of ``body.ELEMENTS``. The load step begins with ``first_step``. It grows by half after an easy step (at most 5
+    Newton iterations), up to ``largest_step`` if given, and is halved, down to ``smallest_step``, if Newton's method needs more
+    than ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal forces and
+    of the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are integrated exactly
+    on a straight cell, by default as the element requires. ``linear_solver``: ``"direct"``, a factorisation of each system;
+    ``"lagged"``, inexact FGMRES, preconditioned with a factorisation that is kept until a new one is cheaper (before a run ends
+    ``out of steps``, it is continued with exact solutions); ``"multigrid"``, FGMRES with two levels of elements; the default
+    depends on the size. ``precision`` of factorisations: by default double if direct and single if lagged. Both settings change the
+    time but not the result. ``follow``: ``"equilibrium"``, any that Newton's method finds, or ``"stable"``: if the equilibrium of a
+    frame is unstable (and negative modes are counted), the body is moved along its lowest mode by a ``perturbation``, a share of
+    its size, and solved again; the perturbation is reversed and enlarged, up to eight times, until there are fewer negative modes.
+    ``reuse``: reuse the state of an earlier frame with the same load. ``time_limit``: the limit on processor time for each rank, by
+    default none; if the wall-clock time exceeds twenty times this limit, the status is *stalled*, which allows no conclusion.
+    ``store_state``: each frame also stores the unknowns of every cell, from which ``results`` evaluates stress, pressure, det F and
+    fibre stretch; by default only for a muscle whose frames together take at most 64 MB.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
@@ -47,12 +47,12 @@ class BodySettings(Record):
 
 
 class Settings(BodySettings):
-    """Numerics of a muscle. ``ranks``: MPI processes, by default 1, or 2 if faster and cores are free; the result is the same."""
+    """Numerical settings for a muscle. ``ranks``: MPI processes, by default 1, or 2 if this is faster and cores are free."""
 
     ranks: int | None = Field(default=None, gt=0, le=1024)
 
 
 class FieldSettings(Record):
-    """Settings of scalar fields. ``time_limit``: the limit of processor time, by default none."""
+    """Settings for scalar fields. ``time_limit``: the limit on processor time, by default none."""
 
     time_limit: Time | None = None

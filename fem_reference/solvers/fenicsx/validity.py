@@ -67,7 +67,7 @@ class Ranges:
     def __str__(self) -> str:
         firsts = [(law, len(states), *next(iter(states.items()))) for law, states in self.found.items()]
         return "".join(
-            f"; {law} is outside the range that it is meant for in {count} of the states reached, "
+            f"; {law} is outside the range of its validity in {count} of the states reached, "
             f"first at frame {frame:g}: {one}"
             for law, count, frame, one in firsts
         )

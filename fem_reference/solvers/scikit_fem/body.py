@@ -29,13 +29,13 @@ _GROWTH = 10.0  # the growth of the residual above which a Newton step is halved
 
 
 class ScikitBodySettings(Record):
-    """Numerics of a body; steps are in frame numbers.
+    """Numerical settings for a body; load steps are in frame numbers.
 
-    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one step to each
-    frame: it grows by half after an easy step (at most 5 Newton iterations) and is halved if Newton's method needs more than
-    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal forces and of
-    the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are integrated exactly on a
-    straight cell, by default as the element requires.
+    ``element``: one of ``body.ELEMENTS``. The load step begins with ``first_step``, by default one step to each frame. It grows by
+    half after an easy step (at most 5 Newton iterations) and is halved, down to ``smallest_step``, if Newton's method needs more
+    than ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal forces and
+    of the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are integrated exactly
+    on a straight cell, by default as the element requires.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
@@ -52,15 +52,15 @@ def _check_known(body: Body) -> None:
         name, got = ("touching", "parts that touch") if body.touching else ("contact", "bones")
         raise InputError(name, got, "a body without it, as this solver has no contact")
     if any(not isinstance(entry.on, str) for entry in body.prescribed):
-        want = "springs on facets, as this solver has no others"
+        want = "springs on facets, as this solver has no other springs"
         raise InputError("prescribed", "springs at points of a skin", want)
     if body.start is not None:
         raise InputError("start", "a state other than rest", "rest, from which this solver begins")
     timed = [effect.title for effect in body.effects if "interval" in effect.needs]
     if timed:
-        raise InputError("effects", ", ".join(timed), "effects without rates, as this solver has no time")
+        raise InputError("effects", ", ".join(timed), "effects without rates, as this solver has no time steps")
     if in_situ.among(body.effects) is not None:
-        want = "effects that leave the body at rest, as this solver balances no tension there"
+        want = "effects that leave the body at rest, as this solver balances no tension at rest"
         raise InputError("effects", "in_situ", want)
     if any(isinstance(effect, Load) and effect.stored for effect in body.effects):
         raise InputError("effects", "membrane", "effects without it: this solver has no energy of a surface")
@@ -163,7 +163,7 @@ class March:
                 return ended("the equations have no unique solution")
             then = self._along(now, step, free, np.inf if gap.any() else _GROWTH * residuals[-1], frame)
             if then is None:
-                return ended("no part of a Newton step has bounded forces")
+                return ended("the forces are unbounded, however short the Newton step is")
             now = then
 
     def _along(self, now: _Tangent, step: Floats, free: Ints, limit: float, frame: float) -> _Tangent | None:

@@ -109,7 +109,7 @@ class Equations:
         return [(effect, effect.amount(frame)) for effect in self.body.effects]
 
     def _felt(self) -> list[int]:
-        """The variables on which the energies depend: the displacement itself is costly and seldom among them."""
+        """The variables on which the energies depend; the displacement itself is costly and seldom needed."""
         deformed = np.append(np.eye(3).ravel(), np.ones(4)) + 0.1 * np.sin(np.arange(VARIABLES))
         jets = variables(deformed[:, None])
         fibre = None if self.inside.fibre is None else self.inside.fibre[:1, 0]
@@ -195,7 +195,7 @@ def _determinant(points: Points, unknowns: Floats) -> Floats:
 
 
 def _chunks(points: Points) -> Iterator[Points]:
-    """The points a few cells at a time."""
+    """The points in groups of a few cells."""
     m, q = points.weights.shape
     size = max(1, _AT_ONCE // q)
     return (points.part(slice(start, start + size)) for start in range(0, m, size))

@@ -1,7 +1,7 @@
 """Scalar fields: Lagrange elements assembled by scikit-fem, solved by scipy's sparse LU factorisation.
 
-Each triangle in space is laid flat before it is assembled. That preserves the lengths and areas within the surface, all that the
-equations need; gradients are rotated back into space.
+Each triangle in space is laid flat before it is assembled. This preserves lengths and areas within the surface, which is all that
+the equations need; gradients are rotated back into space.
 """
 
 import time
@@ -169,7 +169,7 @@ def _fluxes(problem: FieldProblem) -> Floats:
         for s, weight in zip(*_GAUSS, strict=True):
             flow = weight * lengths * problem.diffusion * at(flux.slope, (1 - s) * ends[:, 0] + s * ends[:, 1])
             hats = (1 - s, s) if problem.order == 1 else ((1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s))
-            for nodes, hat in zip((*edges.T, middles), hats, strict=False):  # elements of order 1 have no middles
+            for nodes, hat in zip((*edges.T, middles), hats, strict=False):  # order 1 has no mid-edge nodes
                 np.add.at(b, nodes, hat * flow)
     return b
 

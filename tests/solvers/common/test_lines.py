@@ -152,7 +152,7 @@ def test_points_that_are_refused(changed, message) -> None:
 
 
 def test_without_a_joint_in_the_case_a_guided_point_is_refused() -> None:
-    with pytest.raises(InputError, match="want a joint of the case, which has none"):
+    with pytest.raises(InputError, match="want a joint, but the case has none"):
         solved(replace(hinged(), joints=()), ON_TOP | {"within": ["0 rad", "1 rad"]})
 
 

@@ -49,7 +49,7 @@ def test_what_may_be_a_muscle(points):
         (scaled(1.72, 1.72, 1.72), "diverged", "the surface encloses 5.09 times its volume at rest"),
         (scaled(1, 1, -1), "inverted", "the surface is turned inside out"),
         (scaled(1, 1, 0), "inverted", "the surface is turned inside out"),
-        (scaled(1, 1, np.nan), "diverged", "the position of 42 points is not a number (point 0 for one)"),
+        (scaled(1, 1, np.nan), "diverged", "the position of 42 points is not a number (first: point 0)"),
         (REST.points + [0, 0, np.inf], "diverged", "the position of 42 points is not a number"),
     ],
 )

@@ -23,7 +23,7 @@ def test_the_second_opinion_has_no_time() -> None:
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
     body = Body(mesh, (*flesh("P2/P1"), DRAG), (), (0.0, 1.0), interval=1.0)
     with pytest.raises(
-        InputError, match="effects: got Damping, want effects without rates, as this solver has no time"
+        InputError, match="effects: got Damping, want effects without rates, as this solver has no time steps"
     ):
         solve_body(body, OtherSettings())
 

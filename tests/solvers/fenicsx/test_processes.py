@@ -79,7 +79,7 @@ def test_a_machine_that_is_busy_is_no_time_limit(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(processes, "CLOCK", 0.5)
     outcome = outcome_of([sys.executable, "-c", waits.replace("1.5", "60")], 0.5)
     assert outcome.status == "stalled"
-    assert "the machine was busy, or a process waited; nothing follows about the solution" in outcome.message
+    assert "the machine was busy, or a process waited; this allows no conclusion about the solution" in outcome.message
 
 
 @pytest.mark.usefixtures("all_cores")

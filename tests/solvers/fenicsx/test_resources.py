@@ -54,7 +54,7 @@ def test_the_solver_follows_the_size_and_the_memory(monkeypatch) -> None:
 
 def test_too_little_memory_is_refused_before_it_is_taken() -> None:
     with pytest.raises(
-        InputError, match=r"memory: got \d+ MB for \d+ unknowns \(multigrid\), want at most the 100 MB free"
+        InputError, match=r"memory: got \d+ MB for \d+ unknowns \(multigrid\), want at most the 100 MB of free memory"
     ):
         resources.planned(BodySettings(), box("P2/P1", (6, 6, 6)), 100.0)
     with pytest.raises(InputError, match=r"\(lagged\)"):

@@ -93,7 +93,7 @@ def test_the_time_from_frame_to_frame_must_be_known() -> None:
     with pytest.raises(InputError, match="interval: got nothing, want the time from a frame number to the next"):
         check(body, "P2/P1")
     with pytest.raises(
-        InputError, match="effects: got Viscosity, want effects without rates, as this solver has no time"
+        InputError, match="effects: got Viscosity, want effects without rates, as this solver has no time steps"
     ):
         solve_body(replace(body, interval=1.0), OtherSettings())
 
