@@ -5,7 +5,6 @@ import json
 import logging
 import os
 import re
-import signal
 import sys
 import traceback
 from pathlib import Path
@@ -13,19 +12,20 @@ from typing import Any
 
 from fem_reference.cli._explained import page_of
 from fem_reference.cli._parser import parser
+from fem_reference.foundations import signals
 from fem_reference.foundations.errors import InputError, MissingSoftware
 
 DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
 # The status for a defect of our own: EX_SOFTWARE of sysexits.h. Python's status for an exception is 1, which here is a verdict.
 BROKEN = 70
-INTERRUPTED, TERMINATED = 130, 143  # the statuses that shells report for these signals
+INTERRUPTED = 130  # the status that shells report
 TRACEBACK_SETTING = "FEM_REFERENCE_TRACEBACK"
 _CHECKOUT = Path(__file__).resolve().parents[2]  # the checkout, or the folder in which the package is installed
 
 
 def entry() -> None:
     """The installed command."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that running work is cleaned up
+    signals.listen()
     # Numpy reads it when it is loaded; on a busy machine more threads would wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     sys.exit(main(sys.argv[1:]))

@@ -135,7 +135,8 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
     """Raise _Late after ``seconds`` of this process's processor time, and StalledError after ``CLOCK`` times as long by the clock,
-    both only in the main thread; processes of the reference have a limit of their own.
+    both only in the main thread, and again and again, as Python may lose an exception; processes of the reference have a limit of
+    their own.
     """
 
     def late(*_: object) -> None:
@@ -153,7 +154,7 @@ def _limited(seconds: float) -> Iterator[None]:
     before = [signal.signal(number, handler) for _, number, handler, _ in timers]
     try:
         for timer, _, _, longer in timers:
-            signal.setitimer(timer, longer * seconds)
+            signal.setitimer(timer, longer * seconds, longer * seconds)
         yield
     finally:
         for (timer, number, _, _), handler in zip(timers, before, strict=True):
