@@ -33,11 +33,11 @@ def entry() -> None:
 
 def main(arguments: list[str]) -> int:
     """Carry out a command line; returns the exit status."""
-    options = argparse.Namespace(quiet=False)
+    options, log = argparse.Namespace(quiet=False), logging.getLogger("fem_reference")  # only our own messages
+    level, handlers = log.level, log.handlers[:]
     try:
         words = [word for word in arguments if not word.startswith("-")]
         options = parser(words[0] if words else "").parse_args(arguments)
-        log = logging.getLogger("fem_reference")  # only our own messages
         log.setLevel(logging.WARNING if options.quiet else logging.INFO)
         log.handlers[:] = [logging.StreamHandler(sys.stderr)]
         _check_outputs(options)
@@ -56,6 +56,9 @@ def main(arguments: list[str]) -> int:
     except BaseException as error:  # no error may end with the status of a verdict
         print(f"fem-reference: {_why_broken(error)}", file=sys.stderr)
         return BROKEN
+    finally:
+        log.setLevel(level)
+        log.handlers[:] = handlers
     return status
 
 
