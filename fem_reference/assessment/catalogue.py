@@ -121,7 +121,9 @@ class Entry:
         return Finding(value, fall, steps, self.refinement.note)
 
 
-def _finding(found: float | Finding) -> Finding:
+def _finding(found: float | Finding | None) -> Finding:
+    if found is None:
+        return Finding(math.nan, note="it measured no value")
     return found if isinstance(found, Finding) else Finding(found)
 
 

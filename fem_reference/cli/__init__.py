@@ -5,7 +5,6 @@ import json
 import logging
 import os
 import re
-import signal
 import sys
 import traceback
 from pathlib import Path
@@ -13,19 +12,20 @@ from typing import Any
 
 from fem_reference.cli._explained import page_of
 from fem_reference.cli._parser import parser
+from fem_reference.foundations import signals
 from fem_reference.foundations.errors import InputError, MissingSoftware
 
 DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
 # The status for an error in this program: EX_SOFTWARE of sysexits.h. Python's status for an exception is 1, here a verdict.
 BROKEN = 70
-INTERRUPTED, TERMINATED = 130, 143  # the statuses that shells report for these signals
+INTERRUPTED = 130  # the status that shells report
 TRACEBACK_SETTING = "FEM_REFERENCE_TRACEBACK"
 _CHECKOUT = Path(__file__).resolve().parents[2]  # the checkout, or the folder in which the package is installed
 
 
 def entry() -> None:
     """The installed command."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that running work is cleaned up
+    signals.listen()
     # Numpy reads this variable when it is loaded. On a busy machine, more threads would wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     sys.exit(main(sys.argv[1:]))
@@ -33,11 +33,11 @@ def entry() -> None:
 
 def main(arguments: list[str]) -> int:
     """Carry out a command line; returns the exit status."""
-    options = argparse.Namespace(quiet=False)
+    options, log = argparse.Namespace(quiet=False), logging.getLogger("fem_reference")  # only our own messages
+    level, handlers = log.level, log.handlers[:]
     try:
         words = [word for word in arguments if not word.startswith("-")]
         options = parser(words[0] if words else "").parse_args(arguments)
-        log = logging.getLogger("fem_reference")  # only our own messages
         log.setLevel(logging.WARNING if options.quiet else logging.INFO)
         log.handlers[:] = [logging.StreamHandler(sys.stderr)]
         _check_outputs(options)
@@ -56,6 +56,9 @@ def main(arguments: list[str]) -> int:
     except BaseException as error:  # no error may end with the status of a verdict
         print(f"fem-reference: {_why_broken(error)}", file=sys.stderr)
         return BROKEN
+    finally:
+        log.setLevel(level)
+        log.handlers[:] = handlers
     return status
 
 

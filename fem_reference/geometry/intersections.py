@@ -5,7 +5,7 @@ from igl import predicates
 from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, normals
-from fem_reference.geometry.boxes import boxes_of, touching
+from fem_reference.geometry.boxes import bounds, within
 from fem_reference.geometry.near_pairs import near_pairs
 
 
@@ -38,7 +38,8 @@ def self_crossings(surface: Surface) -> Ints:
 def crossings(one: Surface, other: Surface) -> Ints:
     """Pairs (k, 2) of triangles of two surfaces that intersect or touch, decided exactly by the predicates of Shewchuk 1997."""
     found = near_pairs(one, other)
-    near = touching(boxes_of(one), boxes_of(other)) if found is None else tuple(map(np.unique, found.T))
+    sides = (within(one, *bounds(other)), within(other, *bounds(one))) if found is None else map(np.unique, found.T)
+    near = tuple(sides)
     if not all(map(len, near)):
         return np.zeros((0, 2), np.int64)
     points = [

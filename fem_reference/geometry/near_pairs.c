@@ -1,4 +1,4 @@
-/* Pairs of triangles that may intersect or touch: all that do, and few that do not.
+/* Triangles in a grid of cells: pairs that may intersect or touch, all that do and few that do not; triangles near points; parts.
 
    A regular grid finds boxes that meet. A pair is left out only if a plane certainly separates its triangles, or if they share an
    edge. Only differences of coordinates are used, with relative rounding errors: SURE is thousands of these.
@@ -68,7 +68,7 @@ static void place(const Grid *grid, Box *box)
     }
 }
 
-/* About four cells per box at most, each no smaller than the average box. */
+/* About two cells per box at most, each no smaller than the average box. */
 static void measure(Grid *grid)
 {
     double extent = 0, volume = 1;
@@ -79,7 +79,7 @@ static void measure(Grid *grid)
     }
     for (int i = 0; i < 3; i++)
         volume *= grid->hull.high[i] - grid->hull.low[i] + extent;
-    grid->edge = MORE(extent, cbrt(volume / (4 * (double)grid->count)));
+    grid->edge = MORE(extent, cbrt(volume / (2 * (double)grid->count)));
     for (int i = 0; i < 3; i++) {
         grid->low[i] = grid->hull.low[i];
         grid->size[i] = grid->edge > 0 ? (int)LESS(1000, 1 + (grid->hull.high[i] - grid->low[i]) / grid->edge) : 1;
@@ -93,7 +93,7 @@ static void cross(const double *a, const double *b, double *found)
 }
 
 /* Whether all of a is certainly above all of b along a normal, or below; within bounds the error of heights. */
-static int parts(const double *normal, double (*a)[3], double (*b)[3], double within)
+static int separates(const double *normal, double (*a)[3], double (*b)[3], double within)
 {
     double lows[2] = {INFINITY, INFINITY}, highs[2] = {-INFINITY, -INFINITY};
     for (int k = 0; k < 6; k++) {
@@ -150,7 +150,7 @@ static int parted(double (*a)[3], double (*b)[3], double size)
     double normal[3], edges[2][3];
     for (int i = 0; i < 3; i++)
         normal[i] = a[0][i] + a[1][i] + a[2][i] - b[0][i] - b[1][i] - b[2][i];
-    if (parts(normal, a, b, SURE * size * size))
+    if (separates(normal, a, b, SURE * size * size))
         return 1;
     for (int side = 0; side < 2; side++) {
         double (*one)[3] = side ? b : a, (*other)[3] = side ? a : b;
@@ -158,7 +158,7 @@ static int parted(double (*a)[3], double (*b)[3], double size)
             for (int i = 0; i < 3; i++)
                 edges[k][i] = one[k + 1][i] - one[0][i];
         cross(edges[0], edges[1], normal);
-        if (parts(normal, one, other, SURE * size * size * size))
+        if (separates(normal, one, other, SURE * size * size * size))
             return 1;
     }
     return 0;
@@ -324,4 +324,54 @@ int64_t near_pairs(Surface one, Surface other, const Grid *grid, int itself, int
     else
         add_of_two(&found, grid);
     return found.count;
+}
+
+static int meets_any(const Grid *grid, const Box *box)
+{
+    EVERY_CELL(*box)
+        for (int64_t k = grid->starts[at]; k < grid->starts[at + 1]; k++) {
+            const Box *other = grid->boxes + grid->inside[k];
+            int found = 1;
+            for (int i = 0; i < 3; i++)
+                found &= (box->low[i] <= other->high[i]) & (other->low[i] <= box->high[i]);
+            if (found)
+                return 1;
+        }
+    return 0;
+}
+
+/* Fill found with the triangles of a surface whose boxes meet one in the grid; the result is their number. */
+int64_t reached(Surface surface, const Grid *grid, int64_t *found)
+{
+    int64_t count = 0;
+    for (int64_t t = 0; t < surface.count; t++) {
+        if (beyond(&surface, t, &grid->hull))
+            continue;
+        Box box = box_of(&surface, t);
+        place(grid, &box);
+        if (meets_any(grid, &box))
+            found[count++] = t;
+    }
+    return count;
+}
+
+static int64_t first(int64_t *before, int64_t vertex)
+{
+    while (before[vertex] != vertex)
+        vertex = before[vertex] = before[before[vertex]];
+    return vertex;
+}
+
+/* Fill before with the first vertex of the part of each of count vertices; triangles connect their corners. */
+void parts(Surface surface, int64_t count, int64_t *before)
+{
+    for (int64_t v = 0; v < count; v++)
+        before[v] = v;
+    for (int64_t t = 0; t < surface.count; t++)
+        for (int c = 1; c < 3; c++) {
+            int64_t one = first(before, surface.corners[3 * t]), other = first(before, surface.corners[3 * t + c]);
+            before[MORE(one, other)] = LESS(one, other);
+        }
+    for (int64_t v = 0; v < count; v++)
+        before[v] = before[before[v]];
 }

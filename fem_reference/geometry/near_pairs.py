@@ -1,4 +1,4 @@
-"""Pairs of triangles that may intersect, found by compiled loops (``near_pairs.c``)."""
+"""Pairs of triangles that may intersect, triangles near points, and parts of surfaces, by compiled loops (``near_pairs.c``)."""
 
 import ctypes
 from functools import cache, lru_cache
@@ -8,10 +8,12 @@ import numpy as np
 import platformdirs
 
 from fem_reference.foundations import native
-from fem_reference.foundations.mesh import Ints, Surface
+from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts
+from fem_reference.geometry.boxes import within
 
 # No -ffast-math: it reorders sums, and the bounds of their rounding errors would not hold.
-_FLAGS = ("-O3", "-march=native")
+# Gathering three coordinates into a vector takes longer than it saves.
+_FLAGS = ("-O3", "-march=native", "-fno-tree-slp-vectorize")
 _ROOM = 1000
 
 
@@ -60,6 +62,38 @@ def near_pairs(one: Surface, other: Surface) -> Ints | None:
     return pairs[:found]
 
 
+def reached(surface: Surface, points: Floats, reach: Floats) -> Ints:
+    """The triangles (k,) whose bounding boxes come within ``reach`` (n,) [mm] of one of ``points`` (n, 3) along each axis: all that
+    do, and without a compiler some others.
+    """
+    corners, numbers, code = (
+        np.stack([points.T - reach, points.T + reach]).transpose(0, 2, 1),
+        np.arange(len(points)),
+        _code(),
+    )
+    if code is None:
+        return within(surface, corners[0].min(axis=0), corners[1].max(axis=0))
+    # The box of a triangle with two equal corners is that of its ends.
+    boxes = _Sorted(Surface(corners.reshape(-1, 3), np.stack([numbers, numbers + len(points), numbers], axis=1)), code)
+    found = np.empty(len(surface.triangles), np.int64)
+    return found[: code.reached(_Triangles.of(surface), boxes.grid, found.ctypes.data)]
+
+
+@lru_cache(maxsize=16)
+def parts_of(surface: Surface) -> tuple[Ints, Ints]:
+    """The first vertices (k,) of the connected parts of a ``surface``, and that of the part of each vertex (n,), up to the last
+    vertex of a triangle.
+    """
+    count, code = int(surface.triangles.max(initial=-1)) + 1, _code()
+    found = np.empty(count, np.int64)
+    if code is None:
+        part = connected_parts(surface.triangles[:, :2].ravel(), surface.triangles[:, 1:].ravel(), count)
+        found = np.unique(part, return_index=True)[1][part]
+    else:
+        code.parts(_Triangles.of(surface), count, found.ctypes.data)
+    return np.flatnonzero(found == np.arange(count)), found
+
+
 @cache
 def _code() -> ctypes.CDLL | None:
     folder = platformdirs.user_cache_path("fem_reference") / "compiled"
@@ -70,5 +104,7 @@ def _code() -> ctypes.CDLL | None:
     code.sorted.argtypes, code.sorted.restype = [_Triangles], ctypes.c_void_p
     code.forget.argtypes, code.forget.restype = [ctypes.c_void_p], None
     code.near_pairs.argtypes = [_Triangles, _Triangles, ctypes.c_void_p, ctypes.c_int, ctypes.c_int64, ctypes.c_void_p]
-    code.near_pairs.restype = ctypes.c_int64
+    code.reached.argtypes = [_Triangles, ctypes.c_void_p, ctypes.c_void_p]
+    code.near_pairs.restype = code.reached.restype = ctypes.c_int64
+    code.parts.argtypes, code.parts.restype = [_Triangles, ctypes.c_int64, ctypes.c_void_p], None
     return code

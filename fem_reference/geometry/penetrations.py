@@ -2,18 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import NamedTuple
 
 import igl
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
 from fem_reference.foundations.motion import apply
-from fem_reference.geometry.boxes import around, bounds, boxes_of, reached
+from fem_reference.geometry.boxes import bounds
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings
+from fem_reference.geometry.near_pairs import parts_of, reached
 from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.skins import edge_lengths, quartered
 
@@ -93,7 +93,7 @@ def depths_within(body: Surface, points: Floats, known: Ints) -> Floats:
         return found
     triangles = body.triangles[known] if len(known) else body.triangles
     squares = igl.point_mesh_squared_distance(points[some], body.points, triangles)[0]
-    near = reached(around(points[some], _MORE * np.sqrt(squares)), boxes_of(body))
+    near = reached(body, points[some], _MORE * np.sqrt(squares))
     triangles = body.triangles[near][triangle_areas(body.points, body.triangles[near]) > 0]
     if len(triangles):
         vertices, numbers = np.unique(triangles, return_inverse=True)
@@ -157,22 +157,9 @@ def _flood(deep: NDArray[np.bool_], triangles: Ints, crossing: Ints) -> None:
 
 
 def _tips(surface: Surface, crossing: Ints) -> Ints:
-    """A vertex of each part of a surface without triangles ``crossing`` another surface: the part is on one side."""
-    firsts, parts = _parts_of(surface)
-    return np.delete(firsts, parts[surface.triangles[crossing, 0]])
-
-
-@lru_cache(maxsize=16)
-def _parts_of(surface: Surface) -> tuple[Ints, Ints]:
-    return _parts(surface.triangles.tobytes())
-
-
-@lru_cache(maxsize=8)
-def _parts(triangles: bytes) -> tuple[Ints, Ints]:
-    """The first vertex of each part of a surface of ``triangles``, 64-bit integers, and the index (n,) of the part of each."""
-    corners = np.frombuffer(triangles, np.int64).reshape(-1, 3)
-    parts = connected_parts(corners[:, :2].ravel(), corners[:, 1:].ravel(), int(corners.max()) + 1)
-    return np.unique(parts, return_index=True)[1], parts
+    """A vertex of each part of a surface without triangles ``crossing`` another surface: the whole part is on its side."""
+    firsts, own = parts_of(surface)
+    return np.setdiff1d(firsts, own[surface.triangles[crossing, 0]])
 
 
 class Shared(NamedTuple):

@@ -24,7 +24,7 @@ from fem_reference.foundations.errors import InputError
 log = logging.getLogger(__name__)
 
 # The time [s] within which a signal to all processes reaches this one, after it has ended a process of a lab.
-_HEARD = 0.5
+HEARD = 0.5
 # Errors that fail one entry while the others go on; any other is a bug in this package, or an interrupt.
 FAILURES = (InputError, ValueError, ArithmeticError, LookupError, RuntimeError, OSError)
 
@@ -87,7 +87,7 @@ def run(
         last = _measured(entry, lab, with_negative_control=entry.name in with_negative_control)
         passed = time.perf_counter() - begin
         free.put(lab)
-        if math.isfinite(last.finding.value) or not ended.wait(_HEARD):
+        if math.isfinite(last.finding.value) or not ended.wait(HEARD):
             with reporting:
                 _log_progress(last, next(done), len(wanted), passed)
         return last

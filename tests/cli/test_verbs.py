@@ -1,6 +1,8 @@
 """The contract of verbs, met by every file of cli/: its help names its options, and what it does not know ends with status 2."""
 
 import argparse
+import contextlib
+import logging
 
 import pytest
 
@@ -58,3 +60,21 @@ def test_what_a_verb_does_not_know_ends_with_2(name: str, tmp_path, capsys: pyte
         cli.main([name, *given, "--out", str(tmp_path), "--no-such-option"])
     assert "--no-such-option" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", [["list"], ["list", "--quiet"], ["list", "--unknown"]])
+@pytest.mark.parametrize("error", [None, OSError("disk"), TypeError("ours")])
+def test_the_log_of_a_process_is_left_as_it_was(words, error, monkeypatch: pytest.MonkeyPatch) -> None:
+    def verb(_: argparse.Namespace) -> int:
+        if error:
+            raise error
+        return 0
+
+    monkeypatch.setattr("fem_reference.cli.list.run", verb)
+    log = logging.getLogger("fem_reference")
+    monkeypatch.setattr(log, "level", logging.ERROR)
+    monkeypatch.setattr(log, "handlers", [logging.NullHandler()])
+    before = log.level, log.handlers[:]
+    with contextlib.suppress(SystemExit):
+        cli.main(words)
+    assert (log.level, log.handlers) == before

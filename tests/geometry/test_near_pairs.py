@@ -2,6 +2,7 @@
 
 import itertools
 
+import igl
 import numpy as np
 import pytest
 import shapes
@@ -12,7 +13,7 @@ from fem_reference.foundations import native
 from fem_reference.foundations.mesh import Surface
 from fem_reference.geometry import near_pairs as module
 from fem_reference.geometry.intersections import crossings, self_crossings
-from fem_reference.geometry.near_pairs import near_pairs
+from fem_reference.geometry.near_pairs import near_pairs, parts_of, reached
 
 FLAT = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0]])
 
@@ -146,9 +147,48 @@ def test_degenerate_and_empty_surfaces() -> None:
     assert near_pairs(point, lost) is None
 
 
+# Points alone, near points, and reaches over many triangles.
+@pytest.mark.parametrize("reach", [0.0, 1.0, 30.0])
+@pytest.mark.parametrize("count", [1, 50])
+def test_the_triangles_whose_boxes_points_reach_are_found(count, reach) -> None:
+    """By comparing each box with each point."""
+    found = 0
+    for seed in range(4):
+        rng, given = np.random.default_rng(seed), crumpled(seed, 0.3)
+        corners = given.points[given.triangles]
+        points = rng.choice(corners[:, 0], count) + reach * rng.uniform(-1, 1, (count, 3))
+        reaches = reach * rng.uniform(0, 1, count)
+        away = np.maximum(corners.min(axis=1)[:, None] - points, points - corners.max(axis=1)[:, None]).max(axis=2)
+        meets = (away <= reaches).any(axis=1)
+        assert reached(given, points, reaches).tolist() == np.flatnonzero(meets).tolist()
+        found += meets.sum()
+    assert found
+    assert not len(reached(given, points + 500, reaches))
+
+
+def test_parts_begin_at_their_first_vertices() -> None:
+    """Of three spheres whose triangles and vertices are mixed, by libigl."""
+    rng, balls = np.random.default_rng(0), [shapes.sphere(2, size) for size in (1.0, 2.0, 3.0)]
+    starts = np.cumsum([0, *(len(ball.points) for ball in balls)])
+    triangles = np.concatenate([ball.triangles + start for ball, start in zip(balls, starts, strict=False)])
+    names = rng.permutation(starts[-1])
+    surface = Surface(np.zeros((starts[-1], 3)), rng.permutation(names[triangles]))
+    firsts, own = parts_of(surface)
+    true = igl.vertex_components(surface.triangles)
+    assert firsts.tolist() == sorted(np.flatnonzero(true == part)[0] for part in range(3))
+    assert (own == firsts[[int(np.flatnonzero(true[firsts] == part)[0]) for part in true]]).all()
+
+
+def test_vertices_without_triangles_are_parts_of_their_own() -> None:
+    firsts, own = parts_of(Surface(np.zeros((6, 3)), np.array([[4, 1, 2]])))
+    assert (firsts.tolist(), own.tolist()) == ([0, 1, 3], [0, 1, 1, 3, 1])
+
+
 def test_without_a_compiler_the_answers_are_the_same(monkeypatch) -> None:
     given, other = crumpled(0, 0.3), crumpled(1, 0.0)
     with_it = self_crossings(given), crossings(given, other)
+    middle, parts = given.points[:1], parts_of(given)
+    near = reached(given, middle, np.ones(1))
 
     def missing(*_: object) -> None:
         raise OSError("cc")
@@ -160,5 +200,8 @@ def test_without_a_compiler_the_answers_are_the_same(monkeypatch) -> None:
         for one, two in zip(with_it, (self_crossings(given), crossings(given, other)), strict=True):
             assert len(one) > 10
             assert set(map(tuple, one.tolist())) == set(map(tuple, two.tolist()))
+        parts_of.cache_clear()
+        assert [found.tolist() for found in parts_of(given)] == [found.tolist() for found in parts]
+        assert reached(given, middle, np.ones(1)).tolist() == near.tolist()
     finally:
         module._code.cache_clear()

@@ -4,7 +4,6 @@ import logging
 import math
 import os
 import signal
-import sys
 import threading
 import time
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ import pytest
 from fem_reference.assessment.catalogue import Finding
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.verification import runner
+from tests.signals import Losing, listening
 from tests.verification.stand_ins import Labs, catalogue, entry, raising
 
 
@@ -114,14 +114,17 @@ def test_no_more_labs_than_work_or_cores(monkeypatch) -> None:
         OSError("pipe"),
     ],
 )
-def test_an_entry_that_raises_fails_alone(error) -> None:
+def test_an_entry_that_raises_fails_alone(error, monkeypatch) -> None:
+    monkeypatch.setattr(runner, "HEARD", 0.0)
     failed, other = runner.run([raising(error), entry("other")], Labs())
     assert (failed.word, other.word) == ("fail", "pass")
     assert math.isnan(failed.finding.value)
     assert failed.finding.note == f"{type(error).__name__}: {error}"
 
 
-def test_a_truth_that_raises_fails_its_entry_alone() -> None:
+def test_a_truth_that_raises_fails_its_entry_alone(monkeypatch) -> None:
+    monkeypatch.setattr(runner, "HEARD", 0.0)
+
     def no_truth():
         raise ValueError("no root")
 
@@ -166,10 +169,12 @@ def test_a_thread_stops_after_its_entry_when_the_other_met_a_mistake(monkeypatch
     assert measured == ["slow"]
 
 
+@pytest.mark.parametrize("lost", [False, True])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_to_the_command_judges_no_entry(number, caplog, monkeypatch) -> None:
+def test_a_signal_to_the_command_judges_no_entry(number, lost, caplog, monkeypatch) -> None:
+    """Also if Python first loses the exception of the signal, as in a callback or in a deletion."""
     monkeypatch.setattr(runner.os, "sched_getaffinity", lambda _: set(range(2)))
-    before = signal.signal(number, lambda *_: sys.exit(130))
+    before = signal.signal(signal.SIGUSR1, lambda *_: [Losing(number)].clear())
     struck, measured = threading.Event(), []
 
     def dies(_):  # the processes of labs end by the signal that ends the command, one of them before it is heard here
@@ -177,7 +182,7 @@ def test_a_signal_to_the_command_judges_no_entry(number, caplog, monkeypatch) ->
         raise RuntimeError("the process of FEniCSx ended with exit status -2")
 
     def dies_first(lab):
-        threading.Timer(0.05, lambda: os.kill(os.getpid(), number)).start()
+        threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGUSR1 if lost else number)).start()
         return dies(lab)
 
     def dies_later(lab):
@@ -186,12 +191,19 @@ def test_a_signal_to_the_command_judges_no_entry(number, caplog, monkeypatch) ->
         return dies(lab)
 
     later = [entry(f"later_{i}", lambda _: measured.append("later")) for i in range(3)]
+    ended = pytest.raises((SystemExit, KeyboardInterrupt))
     try:
-        with caplog.at_level(logging.INFO, "fem_reference"), pytest.raises(SystemExit) as ended:
+        with caplog.at_level(logging.INFO, "fem_reference"), ended, listening():
             runner.run([entry("first", dies_first), entry("second", dies_later), *later], Labs())
     finally:
-        signal.signal(number, before)
-    assert (ended.value.code, measured, caplog.messages) == (130, [], [])
+        signal.signal(signal.SIGUSR1, before)
+    assert (measured, caplog.messages) == ([], [])
+
+
+def test_an_entry_without_a_value_fails(monkeypatch) -> None:
+    monkeypatch.setattr(runner, "HEARD", 0.0)
+    none, other = runner.run([entry("none", lambda _: None), entry("other")], Labs())
+    assert (none.word, none.finding.note, other.word) == ("fail", "it measured no value", "pass")
 
 
 def test_entries_that_fail_with_a_number_wait_for_no_signal(monkeypatch) -> None:

@@ -135,7 +135,7 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
     """Raise _Late after ``seconds`` of this process's processor time, and StalledError after ``CLOCK`` times as much clock time,
-    both only in the main thread; processes of the reference have their own limit.
+    both only in the main thread, and repeatedly, as Python may lose an exception; processes of the reference have their own limit.
     """
 
     def late(*_: object) -> None:
@@ -153,7 +153,7 @@ def _limited(seconds: float) -> Iterator[None]:
     before = [signal.signal(number, handler) for _, number, handler, _ in timers]
     try:
         for timer, _, _, longer in timers:
-            signal.setitimer(timer, longer * seconds)
+            signal.setitimer(timer, longer * seconds, longer * seconds)
         yield
     finally:
         for (timer, number, _, _), handler in zip(timers, before, strict=True):

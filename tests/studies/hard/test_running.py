@@ -1,5 +1,6 @@
 """Every solver on hard cases: runs become verdicts and never tracebacks, and what explodes is found out."""
 
+import sys
 import time
 from dataclasses import replace
 
@@ -148,6 +149,31 @@ def test_a_busy_machine_turns_no_verdict(monkeypatch) -> None:
         == running.signal.getitimer(running.signal.ITIMER_REAL)
         == (0, 0)
     )
+
+
+def test_a_limit_ends_a_solver_even_if_its_first_exception_is_lost(monkeypatch) -> None:
+    """As Python loses what is raised in a callback or a deletion that happens to run."""
+    lost = []
+
+    def work(seconds) -> None:
+        until = time.process_time() + seconds
+        while time.process_time() < until:
+            pass
+
+    class Deleted:
+        def __del__(self) -> None:
+            work(2.0)
+
+    def solve(*_):
+        Deleted()
+        work(10.0)
+        raise AssertionError("without a limit")
+
+    monkeypatch.setattr(sys, "unraisablehook", lambda found: lost.append(found.exc_type))
+    stand_ins.solve_by(monkeypatch, pbd, solve)
+    monkeypatch.setattr(running, "LIMIT", 0.1)  # twice that, of processor time
+    found = cell("at_rest.millimetres", "pbd")
+    assert (found.status, len(lost)) == ("timed out", 1)
 
 
 def test_a_reference_that_stalls_is_inconclusive(monkeypatch) -> None:

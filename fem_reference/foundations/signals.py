@@ -1,0 +1,27 @@
+"""Signals that end this process, and the exceptions that they raise."""
+
+import os
+import signal
+import sys
+import threading
+
+TERMINATED = 143  # the status that shells report
+_RAISED = {KeyboardInterrupt: signal.SIGINT, SystemExit: signal.SIGTERM}
+# The time [s] after which a signal whose exception was lost is repeated.
+_AGAIN = 0.05
+
+
+def listen() -> None:
+    """Let SIGTERM raise SystemExit, as SIGINT raises KeyboardInterrupt, so that running work is cleaned up. Python loses what is
+    raised in a callback or ``__del__`` that it happens to run: then the signal is repeated.
+    """
+    before = sys.unraisablehook
+
+    def lost(found: "sys.UnraisableHookArgs") -> None:
+        if found.exc_type in _RAISED:
+            threading.Timer(_AGAIN, os.kill, (os.getpid(), _RAISED[found.exc_type])).start()
+        else:
+            before(found)
+
+    sys.unraisablehook = lost
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))
