@@ -22,7 +22,7 @@ _RANGE = "least and greatest fibre"
 _STATISTICS = (
     ("max", "worst vertex", "-"),
     ("hausdorff", "Hausdorff", "--"),
-    ("p95", "95 % below", "-."),
+    ("p95", "95th percentile", "-."),
     ("rms", "rms", ":"),
 )
 

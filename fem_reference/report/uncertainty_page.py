@@ -106,7 +106,7 @@ def drawing(found: Uncertainty, band: Band) -> Drawing:
 def _draw(found: Uncertainty, band: Band, axes: Axes) -> None:
     frames, bar = np.asarray(band.numbers, float), np.zeros(len(band.numbers)) if band.bar is None else band.bar
     low, high = (np.zeros(len(frames)) if band.distance else band.low - band.nominal), band.high - band.nominal
-    label = "95 % below" if band.distance else "5 to 95 %"
+    label = "95th percentile" if band.distance else "5 to 95 %"
     axes.fill_between(frames, low, high, color=_SHADE, alpha=0.25, linewidth=0, label=label)
     axes.plot(frames, band.median - band.nominal, color=_SHADE, linewidth=1.2, label="median")
     if band.bar is not None:
