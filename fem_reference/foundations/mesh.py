@@ -26,10 +26,7 @@ TET_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
 def read_only(values: Any, dtype: type) -> NDArray[Any]:
-    """A read-only copy of ``values``; ``values`` themselves, if they are such an array."""
-    given = values.flags if isinstance(values, np.ndarray) and values.dtype == dtype else None
-    if given is not None and given.c_contiguous and given.owndata and not given.writeable:
-        return values
+    """A read-only copy of ``values``."""
     array: NDArray[Any] = np.array(values, dtype=dtype, order="C")
     array.setflags(write=False)
     return array
