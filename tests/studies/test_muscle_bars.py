@@ -206,6 +206,23 @@ def test_a_candidate_of_one_muscle_is_compared_in_python(two) -> None:
         solve(case, muscle="thin", store=store)
 
 
+def test_a_muscle_with_the_name_of_a_folder_of_its_run_mixes_nothing(two) -> None:
+    """Error bars of a muscle are in a folder with its name beside the frames, here in the folders of surfaces and of fibres."""
+    path = two / "case.toml"
+    path.write_text(
+        path.read_text().replace('name = "wide"', 'name = "surface"').replace('name = "thin"', 'name = "fibres"')
+    )
+    bench = Bench(casefile.read(two), two / "runs")
+    reference = bench.reference()
+    made = muscle_bars.obtain(bench, reference)
+    again = solve(casefile.read(two), store=two / "runs")
+    assert again.folder == reference.folder
+    assert np.array_equal(again.positions, reference.positions)
+    for name, bars in muscle_bars.stored(bench, again).items():
+        for stored, own in zip(bars.bars, made[name].bars, strict=True):
+            assert stored.values == pytest.approx(own.values, nan_ok=True)
+
+
 def test_bars_are_of_all_muscles_or_of_none_and_of_this_code(two) -> None:
     bench = Bench(casefile.read(two), two / "runs")
     reference = bench.reference()
