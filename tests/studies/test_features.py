@@ -95,11 +95,11 @@ def test_contact_between_parts_takes_as_many_steps_as_their_facets_are_passed() 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("change", "measured"), [({}, 25), (QUICK, 20)])
+@pytest.mark.parametrize(("change", "measured"), [({}, 25), (QUICK, 15)])
 def test_the_time_of_two_muscles_is_expected_within_a_factor_of_three(
     change: dict[str, object], measured: float
 ) -> None:
-    """Measured as processor time: 109 and 135 iterations of Newton's method, in 10 and in 2 frames."""
+    """Processor time for 109 and 135 iterations, in 10 and in 2 frames; 65 and 39 s where other processes keep the machine busy."""
     case = casefile.read("two_muscles", changes=change)
     built = Bench(case, Path()).problem().body
     assert built is not None
