@@ -58,7 +58,7 @@ def check_changes(changes: object) -> None:
         raise InputError("changes", said(changes), 'values by key, such as {"frames.last": 10}')
 
 
-def check_solver(solver: object, settings: Mapping[str, object], muscle: str) -> None:
+def check_solver(solver: object, settings: Mapping[str, object], muscle: str = "") -> None:
     """Raise InputError unless ``solver`` is a name or a function, or None without ``settings`` and without a ``muscle``."""
     if solver is None and muscle:
         raise InputError("muscle", said(muscle), "a solver for it, as the reference solves all muscles together")
