@@ -176,19 +176,19 @@ def _formula(record: type[Record]) -> str:
     return _cell(_markdown(inspect.getdoc(record) or "").partition("\n\n")[0])
 
 
-_RAMP = "list of `RampPoint` tables (at least 1)"
+_SHORTER = {
+    re.escape("list of `RampPoint` tables (at least 1)"): "list of `{ frame, amount }`",
+    r"vector \[(.*?)\]": r"vector, \1",
+    r"quantity \[(.*?)\]": r"\1",
+    r" \((.*)\)": r", \1",
+}
 
 
 def _parameter(named: tuple[str, Any]) -> str:
     """A key with its value, and its unit alone where it is a quantity."""
     key, field = named
     value = _value(field.annotation, field.metadata)
-    for long, short in (
-        (re.escape(_RAMP), "list of `{ frame, amount }`"),
-        (r"vector \[(.*?)\]", r"vector, \1"),
-        (r"quantity \[(.*?)\]", r"\1"),
-        (r" \((.*)\)", r", \1"),
-    ):
+    for long, short in () if _rule(field.annotation, field.metadata) else _SHORTER.items():
         value = re.sub(long, short, value)
     return f"`{key}` ({_cell(value)}{'' if field.is_required() else ', optional'})"
 
@@ -269,14 +269,9 @@ def _row(name: str, field: Any) -> str:
 def _value(annotation: Any, metadata: Any = ()) -> str:
     """What may stand as the value of a key, in words."""
     unit, origin, inside = unit_of(metadata), get_origin(annotation), get_args(annotation)
-    if any(getattr(entry, "func", None) is length_unit for entry in metadata):
-        return f"unit of length: {', '.join(f'`"{unit}"`' for unit in LENGTH_UNITS)}"
-    bounds = [
-        f"{sign} {getattr(one, key):g}" for one in metadata for of, (key, sign) in _BOUNDS.items() if type(one) is of
-    ]
-    bounds += [f"at least {one.min_length}" for one in metadata if isinstance(one, MinLen)]
-    bounds += [f"at most {one.max_length}" for one in metadata if isinstance(one, MaxLen)]
-    after = f" ({', '.join(bounds)})" if bounds else ""
+    if rule := _rule(annotation, metadata):
+        return rule
+    after = _bounds(metadata)
     if unit:
         return f"{'vector' if origin is tuple else 'quantity'} [{unit}]{after}"
     if hasattr(annotation, "__metadata__"):
@@ -305,6 +300,29 @@ def _either(values: Iterable[str]) -> str:
 def _many(value: str) -> str:
     """The plural of the words of a value."""
     return re.sub(r"\b(list|number|string|table|value)\b", r"\1s", value).replace("quantity", "quantities")
+
+
+def _bounds(metadata: Any) -> str:
+    """The bounds of a value, in brackets; empty where there are none."""
+    bounds = [
+        f"{sign} {getattr(one, key):g}" for one in metadata for of, (key, sign) in _BOUNDS.items() if type(one) is of
+    ]
+    bounds += [f"at least {one.min_length}" for one in metadata if isinstance(one, MinLen)]
+    bounds += [f"at most {one.max_length}" for one in metadata if isinstance(one, MaxLen)]
+    return f" ({', '.join(bounds)})" if bounds else ""
+
+
+def _rule(annotation: Any, metadata: Any) -> str:
+    """What a text must be, in the words of the checks that refuse an empty one; empty where none does."""
+    checks = [getattr(entry, "func", None) for entry in metadata]
+    if length_unit in checks:
+        return f"unit of length: {', '.join(f'`"{unit}"`' for unit in LENGTH_UNITS)}"
+    for check in filter(None, checks if annotation is str else []):
+        try:
+            check("")
+        except ValueError as error:
+            return str(error)
+    return ""
 
 
 def _and_below(record: type[Record]) -> Iterator[type[Record]]:

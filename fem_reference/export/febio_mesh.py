@@ -5,11 +5,19 @@ from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem_reference.export.febio_regions import MUSCLE, parts
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, corner_areas, enclosed_volume
+from fem_reference.foundations.mesh import (
+    Floats,
+    Ints,
+    Surface,
+    TetMesh,
+    boundary,
+    corner_areas,
+    enclosed_volume,
+    found_in,
+)
 from fem_reference.geometry.distance import distances
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone
@@ -79,17 +87,11 @@ def outward(surface: Surface) -> Surface:
     return Surface(surface.points, surface.triangles[:, ::-1]) if turned else surface
 
 
-def among(facets: Ints, others: Ints) -> NDArray[np.bool_]:
-    """Mask (m,) of the ``facets`` (m, 3) that are among ``others`` (k, 3), in any order of their corners."""
-    known = set(map(tuple, np.sort(others, axis=1).tolist()))
-    return np.array([tuple(facet) in known for facet in np.sort(facets, axis=1).tolist()], bool)
-
-
 def free_facets(problem: MuscleProblem) -> Ints:
     """The facets (m, 3) of tets in contact: not attached, and with a middle that is not exempt; InputError if there are none."""
     outer, _ = boundary(problem.mesh.tets)
     attached = np.concatenate([np.zeros((0, 3), np.int64), *problem.mesh.facets.values()])
-    loose = outer[~among(outer, attached)]
+    loose = outer[~found_in(outer, attached)]
     middles = problem.mesh.points[loose].mean(axis=1)
     away, _ = problem.exempt.away(distances(middles, problem.surface).triangle, middles)
     felt = loose[away > problem.exempt.reach]
@@ -169,7 +171,7 @@ class Mesh:
         """The triangles (m, 6) of an attachment, facing outwards; for springs at points, the triangles with such points."""
         if attached.attachment in self.problem.attached_skins:
             return self.curved(np.unique(spring_points(self.problem, attached).facets, axis=0))
-        return self.curved(self.outer[among(self.outer, self.problem.mesh.facets[attached.attachment])])
+        return self.curved(self.outer[found_in(self.outer, self.problem.mesh.facets[attached.attachment])])
 
     def _copy(self, attached: AttachedVertices) -> tuple[str, Floats, Ints]:
         """Kind, points (n, 3) [mm] and triangles that coincide with the attached area, or with parts of it about the points of

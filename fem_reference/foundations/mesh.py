@@ -144,6 +144,17 @@ def boundary(tets: Ints) -> tuple[Ints, Ints]:
     return faces[alone], alone // 4
 
 
+def sorted_corners(facets: Ints) -> list[tuple[int, ...]]:
+    """The corners of each of the ``facets`` (m, k) in ascending order, which are the same for the same facet."""
+    return list(map(tuple, np.sort(facets, axis=1).tolist()))
+
+
+def found_in(facets: Ints, others: Ints) -> Bools:
+    """True (m,) for each of the ``facets`` (m, k) that has the corners of one of ``others`` (n, k), in any order."""
+    known = set(sorted_corners(others))
+    return np.array([one in known for one in sorted_corners(facets)], bool)
+
+
 def united(parts: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
     """The points (n, d) and cells (m, k) of all ``parts`` together; the given cells of a part refer to the points of this part."""
     starts = np.cumsum([0, *(len(points) for points, _ in parts)])

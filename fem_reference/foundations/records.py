@@ -80,8 +80,8 @@ def _check_file_name(name: str) -> str:
 
 
 def _check_part_name(name: str) -> str:
-    if "." in _check_file_name(name):
-        raise ValueError("a name without a dot, as a dot follows it in names of scalars")
+    if not re.fullmatch(rf"[\w-]{{1,{_LONGEST_NAME}}}", name):  # a dot follows it in names of scalars
+        raise ValueError(f"a name of 1 to {_LONGEST_NAME} letters, digits and _ -, without a dot")
     return name
 
 

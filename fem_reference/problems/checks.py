@@ -9,7 +9,7 @@ import numpy as np
 from fem_reference.effects import Effect, Load
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import said
-from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, tet_volumes
+from fem_reference.foundations.mesh import Floats, Ints, TetMesh, place_of, sorted_corners, tet_volumes
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems import directions, friction, loaded, regions, tendons
 from fem_reference.problems.body import (
@@ -205,9 +205,9 @@ def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
 
 def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
     """Raise InputError unless each region in ``names`` has facets, all of them on the boundary of the cells."""
-    boundary = set(map(tuple, np.sort(outer_facets(mesh)[0], axis=1).tolist()))
+    boundary = set(sorted_corners(outer_facets(mesh)[0]))
     for name in names:
-        facets = set(map(tuple, np.sort(mesh.facets[name], axis=1).tolist()))
+        facets = set(sorted_corners(mesh.facets[name]))
         lost = sorted(facets - boundary)
         if not facets:
             raise InputError(f"facets.{name}", "none", "facets of one cell each")

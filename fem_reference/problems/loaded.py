@@ -7,7 +7,7 @@ import numpy as np
 
 from fem_reference.effects import Load
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Bools, Floats, Ints
+from fem_reference.foundations.mesh import Bools, Floats, Ints, found_in
 from fem_reference.problems.body import Body, Prescribed
 
 
@@ -46,16 +46,10 @@ def _places(body: Body) -> Iterator[Floats]:
 
 def _fixed(body: Body, facets: Ints) -> Bools:
     """True (f, 3) for the axes along which the ``facets`` (f, 3 or 4) are prescribed exactly, by one region or by several."""
-    found, names = np.zeros((len(facets), 3), bool), _names(facets)
+    found = np.zeros((len(facets), 3), bool)
     for entry, others in _exact(body):
-        region = set(_names(others))
-        found[np.ix_([name in region for name in names], entry.components)] = True
+        found[np.ix_(found_in(facets, others), entry.components)] = True
     return found
-
-
-def _names(facets: Ints) -> list[tuple[int, ...]]:
-    """The corners of each of the ``facets`` (f, 3 or 4), in order."""
-    return list(map(tuple, np.sort(facets, axis=1).tolist()))
 
 
 def _normals(points: Floats, facets: Ints) -> Floats:

@@ -22,6 +22,7 @@ from fem_reference.foundations.mesh import (
     check_closed,
     check_finite,
     fingerprint,
+    found_in,
     tet_qualities,
     tet_volumes,
     triangle_areas,
@@ -105,9 +106,8 @@ class MuscleProblem(Setup):
         check_thinness(mesh)
         attached = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in self.attached)])
         outer, _ = boundary(mesh.tets)
-        taken = set(map(tuple, np.sort(attached, axis=1).tolist()))
-        free = outer[[tuple(facet) not in taken for facet in np.sort(outer, axis=1).tolist()]]
-        cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
+        facets = {**mesh.facets, "free": outer[~found_in(outer, attached)]}
+        cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, facets)
         prescribed = list(pulling(self, mesh, self.fibres, self.effects))
         for entry in self.attached:
             name, path = entry.attachment, Follows(From(first, entry.bone.pose))

@@ -3,9 +3,8 @@
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, normals
+from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, found_in, normals
 from fem_reference.geometry.distance import depth_within, distances, inside
 from fem_reference.geometry.intersections import crossings, overlaps, self_crossings
 from fem_reference.geometry.skins import edge_lengths
@@ -30,7 +29,7 @@ def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
     one, other = mesh.facets[law.one], mesh.facets[law.other]
     owner, facets, triangles = _skin(mesh, points)
     if law.one == law.other:
-        skin, own = Surface(points, triangles), _among(facets, one)[owner]
+        skin, own = Surface(points, triangles), found_in(facets, one)[owner]
         pairs = self_crossings(skin)
         crossed = (points[triangles[some]] for some in pairs[own[pairs].any(axis=1)].T)
         return max(float(overlaps(*crossed).max(initial=0.0)), depth_within(skin, own)) - _bulge(mesh, points, one)
@@ -40,7 +39,7 @@ def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
         skin = Surface(points, triangles[np.isin(piece[facets[:, 0]], piece[against])[owner]])
         corners = points[np.unique(part)]
         depths.append(distances(corners[inside(skin, corners)], skin).distance.max(initial=0.0))
-        parts.append(Surface(points, triangles[_among(facets, part)[owner]]))
+        parts.append(Surface(points, triangles[found_in(facets, part)[owner]]))
     if len(pairs := crossings(*parts)):
         crossed = (points[part.triangles[some]] for part, some in zip(parts, pairs.T, strict=True))
         depths.append(overlaps(*crossed).max())
@@ -80,18 +79,12 @@ def beyond_rim(body: Body, side: str, other: str) -> Ints:
     named = [mesh.facets[two] for one, two in [*laws, *(law[::-1] for law in laws)] if one == side]
     piece = _pieces(mesh)
     beside = np.isin(piece[facets[:, 0]], piece[mesh.facets[other]])
-    return np.asarray(facets[beside & ~_among(facets, np.concatenate(named)) & (side != other)])
+    return np.asarray(facets[beside & ~found_in(facets, np.concatenate(named)) & (side != other)])
 
 
 def _pieces(mesh: Cells) -> Ints:
     """The number (n,) of the piece to which each point belongs."""
     return connected_parts(np.repeat(mesh.cells[:, 0], mesh.cells.shape[1]), mesh.cells.ravel(), len(mesh.points))
-
-
-def _among(facets: Ints, part: Ints) -> NDArray[np.bool_]:
-    """True (f,) for each of the ``facets`` with the corners of a facet of ``part``, in any order."""
-    own = set(map(tuple, np.sort(part, axis=1).tolist()))
-    return np.array([tuple(key) in own for key in np.sort(facets, axis=1).tolist()], bool)
 
 
 def _skin(mesh: Cells, points: Floats) -> tuple[Ints, Ints, Ints]:

@@ -10,7 +10,7 @@ import numpy as np
 from fem_reference.effects import Effect
 from fem_reference.effects.touching import among
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, connected_parts
+from fem_reference.foundations.mesh import Floats, Ints, connected_parts, sorted_corners
 from fem_reference.problems.contact import penalty, remaining
 
 
@@ -93,12 +93,14 @@ def _check_pairs(touching: Sequence[Touching], facets: Mapping[str, Ints], piece
     (n,): the number of the piece of the mesh to which each point belongs.
     """
     names = {name for law in touching for name in (law.one, law.other)}
-    own = {name: set(map(tuple, np.sort(facets[name], axis=1).tolist())) for name in names}
+    own = {name: set(sorted_corners(facets[name])) for name in names}
     for (i, law), (j, other) in combinations(enumerate(touching), 2):
         for one, two in ((other.one, other.other), (other.other, other.one)):
             sides = (law.one, one), (law.other, two)
             shared = [bool(own[a] & own[b]) for a, b in sides]
-            pieces = [len(np.intersect1d(piece[facets[a]], piece[facets[b]])) for a, b in sides]
-            if all(shared) or (law.around and other.around and all(pieces) and any(shared)):
+            skins = law.around and other.around and any(shared)
+            if all(shared) or (
+                skins and all(len(np.intersect1d(piece[facets[a]], piece[facets[b]])) for a, b in sides)
+            ):
                 got = f'"{other.one}" and "{other.other}" with facets that touch under touching[{i}], too'
                 raise InputError(f"touching[{j}]", got, "one law for a pair of facets")

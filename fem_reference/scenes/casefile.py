@@ -239,6 +239,7 @@ def _check_muscles(case: MusclesCase) -> None:
     others = [bone.name for bone in case.bone]
     others += [one.name for muscle in case.muscle for one in muscle.attachment]
     check_once([*(muscle.name for muscle in case.muscle), *dict.fromkeys(others)], join(case.place, "muscle"))
+    check_once([muscle.name.lower() for muscle in case.muscle], join(case.place, "muscle"))  # they name folders
     if case.expect:
         raise InputError(join(case.place, "expect"), "expectations of all muscles", "muscle[i].expect, for each muscle")
     if in_situ.among(case.effects) is not None:

@@ -58,8 +58,10 @@ def check_changes(changes: object) -> None:
         raise InputError("changes", said(changes), 'values by key, such as {"frames.last": 10}')
 
 
-def check_solver(solver: object, settings: Mapping[str, object]) -> None:
-    """Raise InputError unless ``solver`` is a name or a function, or None without ``settings``."""
+def check_solver(solver: object, settings: Mapping[str, object], muscle: str = "") -> None:
+    """Raise InputError unless ``solver`` is a name or a function, or None without ``settings`` and without a ``muscle``."""
+    if solver is None and muscle:
+        raise InputError("muscle", said(muscle), "a solver for it, as the reference solves all muscles together")
     if solver is not None and not isinstance(solver, str) and not hasattr(solver, "__name__"):
         raise InputError("solver", said(solver), "the name of a solver, a function, or None")
     if solver is None and settings:

@@ -9,7 +9,7 @@ import numpy as np
 from fem_reference.assessment import neighbours
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.errors import InputError
-from fem_reference.runs.store import complete
+from fem_reference.runs.store import Run, complete
 from fem_reference.runs.views import beside
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.studies import judging, muscle_bars
@@ -50,7 +50,7 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, err
             raise InputError(place, f'"{entry.settings["folder"]}" without frames of a muscle', want)
     reference, numbers = bench.reference(), bench.scene.numbers
     bars = (muscle_bars.obtain if error_bars else muscle_bars.stored)(bench, reference)
-    runs = {"reference": {name: complete(run, numbers) for name, run in bench.by_muscle(reference).items()}}
+    runs = {"reference": split(bench, reference)}
     for name, part in parts.items():
         for entry, place in filter(None, own[name]):
             run = part.obtain(entry.name, entry, place)
@@ -66,6 +66,12 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, err
             at = int(np.nanargmax(depth)) if np.isfinite(depth).any() else 0
             worst.append((who, one, other, float(depth[at]), some[one].numbers[at]))
     return ByMuscle(found, tuple(worst), lacking)
+
+
+def split(bench: Bench[Case], reference: Run) -> dict[str, Run]:
+    """The run of each muscle by name, over all frames and beside the others, from the ``reference`` of all muscles."""
+    numbers = bench.scene.numbers
+    return beside({name: complete(run, numbers) for name, run in bench.by_muscle(reference).items()})
 
 
 def _own(chosen: tuple[Candidate, str], name: str) -> tuple[Candidate, str] | None:

@@ -1,6 +1,7 @@
 """Numbers known about a case before it is solved: features, by which cases are compared, and the cost of its reference."""
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from fem_reference.foundations.material_point import REST
 from fem_reference.foundations.mesh import diagonal
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
-from fem_reference.problems.body import Body
+from fem_reference.problems.body import Body, Cells
 from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers.fenicsx import resources
@@ -20,6 +21,9 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 # Measured on hip_flexion: processor time [s] of a Newton iteration with this number of unknowns, the exponent with which it grows,
 # and iterations per frame.
 _SECONDS, _UNKNOWNS, _EXPONENT, _ITERATIONS = 0.13, 5456, 1.15, 4
+# With contact between parts: iterations while the attachments move by the edge of a facet, which bounds the load steps (12 in
+# two_muscles, 23 with its larger tetrahedra, 31 in hip_four_muscles), and the processor time [s] that an iteration takes longer.
+_PER_EDGE, _CONTACT = 15, 0.1
 
 
 class ExpectedCost(NamedTuple):
@@ -36,8 +40,29 @@ def expected(body: Body, settings: Record) -> ExpectedCost:
     count = resources.unknowns(body.mesh, settings.element)
     chosen = resources.planned(settings, body.mesh, math.inf)
     wanted = sum(frame >= body.first for frame in body.frames)
-    seconds = _SECONDS * float((count / _UNKNOWNS) ** _EXPONENT) * _ITERATIONS * (wanted - 1)
-    return ExpectedCost(count, seconds, resources.memory(count, str(chosen.linear_solver), str(chosen.precision)))
+    each, iterations = _SECONDS * float((count / _UNKNOWNS) ** _EXPONENT), float(_ITERATIONS * (wanted - 1))
+    if sides := {name for law in body.touching if law.one != law.other for name in (law.one, law.other)}:
+        each, iterations = each + _CONTACT, max(iterations, _PER_EDGE * _travel(body) / _edge(body.mesh, sides))
+    memory = resources.memory(count, str(chosen.linear_solver), str(chosen.precision))
+    return ExpectedCost(count, each * iterations, memory)
+
+
+def _edge(mesh: Cells, regions: Iterable[str]) -> float:
+    """The mean length [mm] of one edge of each facet of the ``regions``."""
+    ends = np.concatenate([mesh.points[mesh.facets[name][:, :2]] for name in regions])
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
+
+
+def _travel(body: Body) -> float:
+    """The greatest path [mm] of a point with a prescribed displacement, in straight lines from frame to frame."""
+    paths = [0.0]
+    for entry in body.prescribed:
+        points = (
+            body.mesh.points[np.unique(body.mesh.facets[entry.on])] if isinstance(entry.on, str) else entry.on.points
+        )
+        moved = np.diff([entry.displacements(points, frame) for frame in body.frames], axis=0)
+        paths.append(float(np.linalg.norm(moved, axis=2).sum(axis=0).max(initial=0.0)))
+    return max(paths)
 
 
 def features(case: MuscleCase, setup: Setup) -> dict[str, float]:

@@ -39,7 +39,7 @@ def compare(
     case, setup = bench.scene, bench.setup()
     if case.parts:
         raise InputError(
-            case.place, "a comparison of several muscles as one", "the command compare, which compares each muscle"
+            case.place, "a comparison of several muscles as one", "one muscle, or the command compare, for each"
         )
     complete_runs = tuple(complete(run, case.numbers) for run in candidates)
     result = comparison.compare(case, setup, complete(reference, case.numbers), complete_runs, error_bars)

@@ -18,7 +18,7 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.solvers import command, fenicsx, recorded
-from fem_reference.studies import arguments, judging, muscle_bars, refinement
+from fem_reference.studies import arguments, by_muscle, judging, muscle_bars, refinement
 from fem_reference.studies.execution import Bench
 
 STORE = Path("reports/runs")
@@ -38,6 +38,7 @@ def solve(
     case: Case,
     solver: str | Callable[..., None] | None = None,
     *,
+    muscle: str = "",
     store: str | Path = STORE,
     progress: Progress | None = None,
     **settings: Any,
@@ -46,16 +47,26 @@ def solve(
 
     ``solver``: its name, such as ``"pbd"``, or your function ``solver(scene, out, **settings)``, which reads a folder that
     :func:`export_case` writes and writes frames into another; without it the reference, with the settings of the case. ``settings``
-    are those of the ``solver``, as scene files write them; by default those of the case for it, else those of Table 5.1. The
+    are those of the ``solver``, as scene files write them; by default those of the case for it, else those of Table 5.1.
+    ``muscle``: the name of the one of several that the ``solver`` solves by itself; the reference solves all together. The
     run has ``positions`` (f, n, 3) [mm] of the surface's vertices by frame number, ``outcome`` (status, message, cost) and
     ``folder``. If the solution fails, the status states it, and the frames reached before are kept.
     """
     arguments.check_case(case)
-    arguments.check_solver(solver, settings)
+    arguments.check_solver(solver, settings, muscle)
     folder = arguments.free_folder(store, "store")
-    name, choice = _chosen(case, solver, settings, folder)
+    bench = _bench(case, muscle, folder)
+    name, choice = _chosen(bench.scene, solver, settings, folder)
     with reported(progress):
-        return Bench(case, folder).obtain(name, choice, f'solver "{choice.solver}"')
+        return bench.obtain(name, choice, f'solver "{choice.solver}"')
+
+
+def _bench(case: Case, muscle: str, folder: Path) -> Bench[Any]:
+    """The bench of a case, or of the ``muscle`` with this name if it is not empty; InputError where the case has none of it."""
+    if not muscle:
+        return Bench(case, folder)
+    arguments.check_muscle(muscle, case)
+    return Bench(case, folder).parts[muscle]
 
 
 def _chosen(
@@ -69,16 +80,16 @@ def _chosen(
     return solver, SolverChoice(solver=solver, **settings) if settings else solvers.choice(case, solver)[1]
 
 
-def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
+def read_run(folder: str | Path, case: Case, *, unit: str | None = None, muscle: str = "") -> Run:
     """Read frames that another program wrote, ``positions`` (f, n, 3) [mm] of the vertices of the case's muscle in the same order.
 
     ``folder``: a folder with a mesh per frame, or a file of a sequence; ``candidate.toml`` in it may state name and unit. ``unit``:
-    the unit of length, by default that of ``candidate.toml``, else mm. InputError if a file cannot be read completely, or its
-    vertices or its first frame are not those of the case.
+    the unit of length, by default that of ``candidate.toml``, else mm. ``muscle``: its name, if there are several.
+    InputError if a file cannot be read completely, or its vertices or its first frame are not those of the case.
     """
     arguments.check_case(case)
     choice = recorded.choice(path(folder, "folder"), unit)
-    return Bench(case, STORE).read(choice.name, choice, "folder")
+    return _bench(case, muscle, STORE).read(choice.name, choice, "folder")
 
 
 @overload
@@ -120,19 +131,29 @@ def error_bars(
 
 
 def compare(
-    case: Case, reference: Run, candidates: Sequence[Run] = (), *, error_bars: ErrorBars | None = None
+    case: Case,
+    reference: Run,
+    candidates: Sequence[Run] = (),
+    *,
+    error_bars: ErrorBars | None = None,
+    muscle: str = "",
 ) -> Comparison:
     """Measure candidates against the reference of a case, and judge the expectations of the case.
 
     A frame that a run did not reach is NaN, and never a pass. With ``error_bars`` of the reference, from :func:`error_bars`, a
     verdict that they leave in doubt is inconclusive. ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: ``values``
-    (f,), ``unit``, ``worst`` frame.
+    (f,), ``unit``, ``worst`` frame. ``muscle``: the name of the one of several that is compared; ``reference`` is that of all,
+    ``candidates`` are of this muscle.
     """
     arguments.check_case(case)
-    arguments.check_runs(reference, candidates, case)
-    arguments.check_error_bars(error_bars, case)
-    judge.check(case)
-    return judging.compare(Bench(case, STORE), reference, candidates, error_bars)
+    arguments.check_run(reference, case, "reference")
+    bench = _bench(case, muscle, STORE)
+    if muscle:
+        reference = by_muscle.split(Bench(case, STORE), reference)[muscle]
+    arguments.check_runs(reference, candidates, bench.scene)
+    arguments.check_error_bars(error_bars, bench.scene)
+    judge.check(bench.scene)
+    return judging.compare(bench, reference, candidates, error_bars)
 
 
 def export_case(case: Case, folder: str | Path, form: export.Format = "open") -> list[str]:

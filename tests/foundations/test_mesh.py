@@ -17,6 +17,7 @@ from fem_reference.foundations.mesh import (
     check_finite,
     enclosed_volume,
     fingerprint,
+    found_in,
     tet_qualities,
     tet_volumes,
     triangle_areas,
@@ -45,6 +46,13 @@ def test_the_faces_of_a_tet_point_outward() -> None:
     triangles, tets = boundary(ONE)
     assert_array_equal(np.sort(triangles, axis=0), np.sort(TET_FACES, axis=0))
     assert_array_equal(tets, 0)
+
+
+def test_a_facet_is_that_with_the_same_corners_in_any_order() -> None:
+    facets = np.array([[0, 1, 2], [3, 2, 1], [4, 0, 1]])
+    assert_array_equal(found_in(facets, np.array([[2, 0, 1], [1, 4, 3], [1, 3, 2]])), [True, True, False])
+    assert_array_equal(found_in(facets, np.zeros((0, 3), int)), False)
+    assert found_in(facets[:0], facets).shape == (0,)
 
 
 @pytest.mark.parametrize("turn", [Rotation.identity(), TURN])

@@ -99,6 +99,16 @@ def _said(record: type) -> str:
     return reference_pages._section("", record).partition("\n")[2].strip()
 
 
+def test_the_reference_says_what_a_text_may_be() -> None:
+    """In the words that refuse an empty one: the name of a muscle, after which a dot begins names of scalars, has none."""
+    text = reference_pages.scenes()
+    muscle = text.partition("### MuscleOfSeveral")[2].partition("###")[0]
+    assert "| `name` | a name of 1 to 100 letters, digits and _ -, without a dot | required |" in muscle
+    assert "| `unsolved` | text |" in text
+    formulas = re.findall(r"^\| `(exact|slope|value|where)` \| a number, or a formula of x, y, z", text, re.MULTILINE)
+    assert len(formulas) == 4
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("without_pictures")
 def test_every_public_name_verb_and_case_is_in_the_reference() -> None:

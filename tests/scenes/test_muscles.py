@@ -79,6 +79,7 @@ def test_the_key_changes_with_each_muscle_and_not_with_what_is_expected(bar: Pat
     ("text", "said"),
     [
         (several(nested("a"), nested("a")), r'muscle: got "a" a second time|muscle.*"a"'),
+        (several(nested("a"), nested("A")), r'muscle: got the name "a" twice'),  # one folder on some disks
         (several(nested("a"), nested("wall")), r'muscle.*"wall"'),
         (
             several(nested("a"), nested("b").replace('bone = "lever"', 'bone = "leg"')),

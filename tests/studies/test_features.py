@@ -1,6 +1,7 @@
 """Numbers that are known of a case: by them a recommendation chooses what was studied, and a reference has an expected time."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,11 @@ from fem_reference.problems.body import Body
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import resources
+from fem_reference.studies.execution import Bench
 from fem_reference.studies.features import expected, features
 
 CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
+QUICK = {"muscle[0].tet_size": "10 mm", "muscle[1].tet_size": "10 mm", "frames.every": 20}
 
 
 def test_the_numbers_of_the_small_bar(tmp_path: Path) -> None:
@@ -75,6 +78,32 @@ def test_one_frame_of_what_was_measured(monkeypatch: pytest.MonkeyPatch) -> None
 def test_each_frame_after_the_first_takes_as_long() -> None:
     one = seconds(body(2), "P2/P1")
     assert seconds(body(2, (0.0, 1.0, 2.0, 5.0)), "P2/P1") == pytest.approx(3 * one)
+
+
+def test_contact_between_parts_takes_as_many_steps_as_their_facets_are_passed() -> None:
+    """Two cubes on cells of 5 mm, of which one is moved by 40 mm and back: 16 edges, with many frames and with few."""
+    cubes = [fr.box((2, 2, 2), (10.0, 10.0, 10.0), "hexahedron") for _ in range(2)]
+    low, high = cubes[0], replace(cubes[1], points=cubes[1].points + [0.0, 0.0, 10.1])
+    path = fr.Prescribed("top", "high_z1", (0,), lambda points, frame: 0 * points + 40 * (1 - abs(1 - frame)))
+    frames, law = (0.0, 1.0, 2.0), fr.Touching("low_z1", "high_z0", 1.0, 0.1)
+    alone = fr.Body(fr.joined({"low": low, "high": high}), body(1).effects, (path,), frames=frames)
+    few = replace(alone, touching=(law,))
+    many = replace(few, frames=tuple(np.linspace(0, 2, 5)))
+    each = seconds(alone, "Q2/Q1") / 2 / 4  # of an iteration, of which 4 are expected in a frame without contact
+    assert seconds(few, "Q2/Q1") == pytest.approx(15 * 80 / 5 * (each + 0.1))
+    assert seconds(many, "Q2/Q1") == pytest.approx(seconds(few, "Q2/Q1"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("change", "measured"), [({}, 25), (QUICK, 15)])
+def test_the_time_of_two_muscles_is_expected_within_a_factor_of_three(
+    change: dict[str, object], measured: float
+) -> None:
+    """Processor time for 109 and 135 iterations, in 10 and in 2 frames; 65 and 39 s where other processes keep the machine busy."""
+    case = casefile.read("two_muscles", changes=change)
+    built = Bench(case, Path()).problem().body
+    assert built is not None
+    assert measured / 3 < expected(built, fenicsx.Settings()).seconds < 3 * measured
 
 
 def test_more_unknowns_take_more_than_in_proportion() -> None:

@@ -10,7 +10,7 @@ import pytest
 import small
 import stand_ins
 
-from fem_reference import cli, error_bars, metrics, report, solve
+from fem_reference import cli, compare, error_bars, metrics, read_run, report, solve
 from fem_reference.assessment import neighbours
 from fem_reference.assessment.error_bars import FILE
 from fem_reference.foundations.errors import InputError
@@ -168,6 +168,59 @@ def test_further_runs_that_the_second_check_denies_or_that_diverge_give_no_bar(t
     for found in muscle_bars.obtain(bench, reference).values():
         assert {bar.metric for bar in found.bars} > {"surface_deviation", "force_on_bone"}
         assert all(np.isnan(bar.values[1:]).all() for bar in found.bars)
+
+
+def test_a_candidate_of_one_muscle_is_compared_in_python(two) -> None:
+    """Frames at rest miss the whole growth of the thin muscle, which is known at each vertex; so do those of another program."""
+    case, store = casefile.read(two), two / "runs"
+    reference, thin = solve(case, store=store), files.read_surface(two / "thin.vtp", 1.0)
+    (two / "still").mkdir()
+    for number in case.numbers:
+        files.write_surface(two / "still" / f"frame_{number:04d}.ply", thin, thin.points)
+    still = read_run(two / "still", case, muscle="thin")
+    counts = [len(one.mesh.tets) for one in Bench(case, store).problem().problems.values()]
+    grows = growth(*counts[::-1]) + GIVES * 0.1 / case.touching.stiffness
+    farthest = np.array(case.numbers) * grows * np.linalg.norm(thin.points, axis=1).max()
+    found = compare(
+        case, reference, [still], muscle="thin", error_bars=error_bars(case, reference, muscle="thin", store=store)
+    )
+    assert found["still", "surface_deviation", "max"].values == pytest.approx(farthest, rel=1e-6)
+    assert found["reference", "neighbour_penetration", "deepest"].values == pytest.approx(0.0)
+    with pytest.raises(KeyError):  # the candidate has no other muscle
+        found["still", "neighbour_penetration", "deepest"]
+    short = replace(
+        reference, numbers=reference.numbers[:2], positions=reference.positions[:2], fibre_positions=None, scalars={}
+    )
+    assert np.isnan(compare(case, short, [still], muscle="thin")["still", "surface_deviation", "max"].values[2:]).all()
+    pbd = solve(case, "pbd", muscle="thin", store=store)
+    assert compare(case, reference, [pbd], muscle="thin")["pbd", "surface_deviation", "max"].values[-1] > 0
+    for name, runs, why in (
+        ("", [], "want one muscle, or the command compare"),
+        ("other", [], "muscle: got str 'other', want one of wide, thin"),
+        ("wide", [pbd], "a run of another case"),
+        ("wide", [reference], "a run of another case"),
+    ):
+        with pytest.raises(InputError, match=why):
+            compare(case, reference, runs, muscle=name)
+    with pytest.raises(InputError, match="want a solver for it, as the reference solves all muscles together"):
+        solve(case, muscle="thin", store=store)
+
+
+def test_a_muscle_with_the_name_of_a_folder_of_its_run_mixes_nothing(two) -> None:
+    """Error bars of a muscle are in a folder with its name beside the frames, here in the folders of surfaces and of fibres."""
+    path = two / "case.toml"
+    path.write_text(
+        path.read_text().replace('name = "wide"', 'name = "surface"').replace('name = "thin"', 'name = "fibres"')
+    )
+    bench = Bench(casefile.read(two), two / "runs")
+    reference = bench.reference()
+    made = muscle_bars.obtain(bench, reference)
+    again = solve(casefile.read(two), store=two / "runs")
+    assert again.folder == reference.folder
+    assert np.array_equal(again.positions, reference.positions)
+    for name, bars in muscle_bars.stored(bench, again).items():
+        for stored, own in zip(bars.bars, made[name].bars, strict=True):
+            assert stored.values == pytest.approx(own.values, nan_ok=True)
 
 
 def test_bars_are_of_all_muscles_or_of_none_and_of_this_code(two) -> None:

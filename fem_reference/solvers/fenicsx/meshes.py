@@ -12,7 +12,7 @@ import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints, found_in
 from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 
 # For each element, the degree up to which polynomials on a straight cell are integrated exactly.
@@ -125,9 +125,7 @@ def local_facets(msh: mesh.Mesh, regions: Iterable[Ints]) -> list[Ints]:
     points = np.asarray(msh.geometry.input_global_indices)[nodes]
     size = len(vertices.array) // max(1, vertices.num_nodes)  # corners of a facet; a rank may have none
     corners = vertices.array.reshape(-1, max(1, size))[exterior]
-    original = list(map(tuple, np.sort(points[corners], axis=1).tolist()))
-    wanted = (set(map(tuple, np.sort(region, axis=1).tolist())) for region in regions)
-    return [exterior[np.array([corners in region for corners in original], bool)] for region in wanted]
+    return [exterior[found_in(points[corners], region)] for region in regions]
 
 
 def facet_measure(msh: mesh.Mesh, regions: Iterable[Ints], degree: int) -> ufl.Measure:
