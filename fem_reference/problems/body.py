@@ -232,6 +232,11 @@ class Body:
         return any(one is not None for one in self.frictions)
 
     @property
+    def has_energy(self) -> bool:
+        """True if contact has an energy: without friction and without two parts that touch, so that its tangent is symmetric."""
+        return not (self.rubs or any(law.along_normals for law in self.touching))
+
+    @property
     def remembers(self) -> bool:
         """True if contact depends on earlier states: if there is friction, or a part of the surface touches itself."""
         return self.rubs or any(law.one == law.other for law in self.touching)

@@ -35,6 +35,13 @@ class Touching:
     around: bool = False
 
     @property
+    def along_normals(self) -> bool:
+        """True if the gap is measured along the points' own normals, between two parts without friction; otherwise to the nearest
+        place. Slip is counted from that place; and what lies behind a point of a part that touches itself is the part itself.
+        """
+        return self.friction is None and self.one != self.other
+
+    @property
     def forces(self) -> tuple[str, str]:
         """The names of the forces on ``one`` and on ``other``, under which a frame reports them."""
         return f"{self.other} on {self.one}", f"{self.one} on {self.other}"

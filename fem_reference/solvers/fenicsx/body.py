@@ -290,8 +290,8 @@ class AssembledBody:
 
 def _linear_solver(system: System, body: Body, settings: BodySettings) -> LinearSolver:
     """The linear solver that ``settings`` name, or the default for the size of the ``system``."""
-    # Without friction and without loads that have no energy, the tangent is symmetric.
-    symmetric = not body.rubs and all(one.stored for one in body.effects if isinstance(one, Load))
+    # The tangent is symmetric if contact and all loads have an energy.
+    symmetric = body.has_energy and all(one.stored for one in body.effects if isinstance(one, Load))
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
     if kind == "multigrid":
         system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # as its stubs declare it

@@ -12,6 +12,10 @@ from fem_reference.solvers.fenicsx.meshes import Displacement, lagrange
 
 _ITERATIONS, _ROUGH = 12, 2  # of Newton's method for the nearest place, and for places far beyond the edges
 _LONGEST, _SMALL = 0.5, 1e-14  # the longest step, and one small enough to stop, in reference coordinates
+# The least sine of a line on a facet in a step, and the distance [mm] up to which it meets a place.
+_FLAT, _OFF = 0.01, 1e-9
+# A point is aside from its nearest place by at most this share of the size of the facet; coordinates far beyond the edges.
+_ASIDE, _NOWHERE = 1e-6, 9.0
 _BALL = 1.25  # the radius of a ball around a facet, over the distance of its farthest node from the mean of its nodes
 
 
@@ -75,10 +79,10 @@ class Facets:
 
     def nearest(self, nodes: Floats, which: Ints, points: Floats) -> FacetPlaces:
         """The places on the facets ``which`` (n,), continued beyond their edges, that are nearest to ``points`` (n, 3) [mm], by
-        Newton's method from the middles of the facets; only rough where they are far beyond the edges.
+        Newton's method from the middles of the facets; only rough where they are far beyond the edges. Where the method does not
+        converge, ``at`` is far beyond the edges: the point would seem near to a facet from which it is far.
         """
-        middle = np.asarray(basix.geometry(self.element.cell_type)).mean(axis=0)
-        at, going = np.tile(middle, (len(which), 1)), np.arange(len(which))
+        at, going = self._middles(which)
         for i in range(_ITERATIONS):
             if not len(going):
                 break
@@ -89,17 +93,55 @@ class Facets:
             convex = (np.linalg.det(curved) > 0) & (np.trace(curved, axis1=1, axis2=2) > 0)
             matrix = np.where(convex[:, None, None], curved, place.metric)
             step = np.linalg.solve(matrix, place.tangents @ away[:, :, None])[:, :, 0]
-            longest = np.abs(step).max(axis=1)
-            at[going] += step * (_LONGEST / np.maximum(longest, _LONGEST))[:, None]
-            going = going[(longest > _SMALL) & ((i < _ROUGH) | (self.beyond(at[going]) < _LONGEST))]
-        return self.places(nodes, which, at)
+            going = self._moved(at, going, step, i)
+        found = self.places(nodes, which, at)
+        away = points - found.point
+        aside = np.linalg.norm(away - np.vecdot(away, found.normal)[:, None] * found.normal, axis=1)
+        lost = (aside > _ASIDE * np.sqrt(np.trace(found.metric, axis1=1, axis2=2))) & (self.beyond(at) < _LONGEST)
+        return replace(found, at=np.where(lost[:, None], _NOWHERE, at))
+
+    def along(self, nodes: Floats, which: Ints, points: Floats, normals: Floats) -> tuple[FacetPlaces, Floats]:
+        """The places where lines through ``points`` (n, 3) [mm] along ``normals`` (n, 3) meet the facets ``which`` (n,), continued
+        beyond their edges, by Newton's method as in ``nearest``; and the distances (n,) [mm] along the lines, NaN where they miss.
+        """
+        at, going = self._middles(which)
+        for i in range(_ITERATIONS):
+            if not len(going):
+                break
+            place, normal = self.places(nodes, which[going], at[going]), normals[going]
+            (u, v), away = np.moveaxis(place.tangents, 1, 0), points[going] - place.point
+            size, across = np.linalg.norm(np.cross(u, v), axis=1), np.vecdot(np.cross(u, v), normal)
+            across = np.where(across < 0, -1, 1) * np.maximum(np.abs(across), _FLAT * size)
+            moved = [np.vecdot(np.cross(*pair), normal) / across for pair in ((away, v), (u, away))]
+            going = self._moved(at, going, np.stack(moved, axis=1), i)
+        found = self.places(nodes, which, at)
+        gap = np.vecdot(found.point - points, normals)
+        off = np.linalg.norm(found.point - points - gap[:, None] * normals, axis=1)
+        return found, np.where(off < _OFF, gap, np.nan)
+
+    def _middles(self, which: Ints) -> tuple[Floats, Ints]:
+        """The coordinates (n, 2) of the middles of facets ``which`` (n,), and the numbers (n,) of these."""
+        middle = np.asarray(basix.geometry(self.element.cell_type)).mean(axis=0)
+        return np.tile(middle, (len(which), 1)), np.arange(len(which))
+
+    def _moved(self, at: Floats, going: Ints, step: Floats, iteration: int) -> Ints:
+        """Move the places ``going`` (k,) of ``at`` (n, 2) by a ``step`` (k, 2), shortened if long; return those that go on."""
+        longest = np.abs(step).max(axis=1)
+        at[going] += step * (_LONGEST / np.maximum(longest, _LONGEST))[:, None]
+        return going[(longest > _SMALL) & ((iteration < _ROUGH) | (self.beyond(at[going]) < _LONGEST))]
 
     def beyond(self, at: Floats) -> Floats:
         """The distance (n,) of reference coordinates ``at`` (n, 2) from the reference facet, 0 inside it."""
-        u, v = at.T
-        triangle = self.element.cell_type == basix.CellType.triangle
-        far = u + v - 1 if triangle else np.maximum(u, v) - 1
-        return np.asarray(np.maximum(np.maximum(-np.minimum(u, v), far), 0.0))
+        return self.leaving(at)[0]
+
+    def leaving(self, at: Floats) -> tuple[Floats, Floats]:
+        """The distance (n,) as in ``beyond``, and its derivative (n, 2)."""
+        (u, v), triangle = at.T, self.element.cell_type == basix.CellType.triangle
+        far = [0 * u, -u, -v, *([u + v - 1] if triangle else [u - 1, v - 1])]
+        slopes = np.array(
+            [(0.0, 0.0), (-1.0, 0.0), (0.0, -1.0), *([(1.0, 1.0)] if triangle else [(1.0, 0.0), (0.0, 1.0)])]
+        )
+        return np.max(far, axis=0), slopes[np.argmax(far, axis=0)]
 
     @staticmethod
     def balls(nodes: Floats) -> tuple[Floats, Floats]:

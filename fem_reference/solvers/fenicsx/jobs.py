@@ -53,8 +53,8 @@ def _is_of(whole: Kept, number: int) -> bool:
 class Job:
     """A ``body`` and how to solve it. ``samples``: by name, the cell (n,) of each point and the rest points (n, 3) whose positions
     are requested. Only a muscle has samples; forces at edges shared by attachments are then divided between the attachments.
-    ``kept``: the states that are kept, if any. InputError if stable states are to be followed with friction, as stability under
-    friction is not known.
+    ``kept``: the states that are kept, if any. InputError if stable states are to be followed with friction, or with two parts that
+    touch, as their stability is not known.
     """
 
     body: Body
@@ -63,7 +63,6 @@ class Job:
     kept: Kept | None = None
 
     def __post_init__(self) -> None:
-        if self.body.rubs and self.settings.follow == "stable":
-            raise InputError(
-                "follow", '"stable" with friction', '"equilibrium", as its unstable states are not counted'
-            )
+        if not self.body.has_energy and self.settings.follow == "stable":
+            got = f'"stable" with {"friction" if self.body.rubs else "two parts that touch"}'
+            raise InputError("follow", got, '"equilibrium", as its unstable states are not counted')

@@ -1,4 +1,4 @@
-"""Pairs of facets of one part of a surface that may touch each other: they share no node, and face each other."""
+"""Pairs of points and facets near each other; in one part of a surface, of facets that face each other and share no node."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,3 +43,14 @@ class OwnPairs:
     def _normals(self, nodes: Floats) -> Floats:
         """The normals (m, 3) in the middles of the facets, with their ``nodes`` (m, k, 3) [mm]."""
         return self.facets.places(nodes, np.arange(self.count), np.full((self.count, 2), 1 / 3)).normal
+
+
+def pairs(points: Floats, middles: Floats, reach: Floats) -> tuple[Ints, Ints]:
+    """Points (p,) and facets (p,) where the point is within ``reach`` (m,) [mm] of the ``middles`` (m, 3) of the facet."""
+    low, high = (middles - reach[:, None]).min(axis=0), (middles + reach[:, None]).max(axis=0)
+    near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+    if not len(near):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    found = cKDTree(points[near]).query_ball_point(middles, reach)
+    some = near[np.concatenate([np.asarray(one, np.int64) for one in found])]
+    return some, np.repeat(np.arange(len(middles)), [len(one) for one in found])

@@ -1,7 +1,7 @@
 """Contact between parts of the surface of a body: forces on the nodes of both sides, and their tangent.
 
-Quadrature points on either side, each with half its area, meet the nearest place on the present facets of the other side: so the
-two sides are treated alike. The pressure is the slope of an energy of the gap, so that forces and moments balance to rounding.
+Quadrature points on either side, each with half its area, meet places on the present facets of the other side: so the two sides
+are treated alike. Both forces act along one line, so that forces and moments balance to rounding.
 """
 
 from collections.abc import Callable
@@ -17,6 +17,7 @@ from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.facets import facets_of
 from fem_reference.solvers.fenicsx.forms import Form
 from fem_reference.solvers.fenicsx.meshes import Displacement, local_facets
+from fem_reference.solvers.fenicsx.rays import Hits, RayPass
 from fem_reference.solvers.fenicsx.rubbing import Rubbed, Rubbing
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoints
@@ -41,9 +42,7 @@ class TouchingForces:
         self.settled: State = np.array(self.unknowns.x.array), [], [], []
         self.move_to(body.frames[0])
         self.settle()
-        depths = [
-            (one.law, -float(met.gap.min(initial=0.0))) for one, (met, _) in zip(self.passes, self.now, strict=True)
-        ]
+        depths = [(one.law, one.depth(met)) for one, (met, _) in zip(self.passes, self.now, strict=True)]
         for law in body.touching:
             seen = max(depth for one, depth in depths if one is law)
             deep, most = max(seen, overlap(body, law)), law.smoothing + (max(seen, 0.0) if law.relaxed else 0.0)
@@ -54,7 +53,7 @@ class TouchingForces:
         self.overlap = max((depth for _, depth in depths), default=0.0)
         for one, (met, _) in zip(self.passes, self.now, strict=True):
             if one.law.relaxed or one.own:
-                one.overlaps[met.points] = np.maximum(one.law.smoothing - met.gap, 0)
+                np.maximum.at(one.overlaps, met.points, one.law.smoothing - met.gap)
         self.seen = np.full_like(self.seen, np.nan)
         self.settle()
 
@@ -86,7 +85,8 @@ class TouchingForces:
         for (law, one, other), around in zip(sides, skins, strict=True):
             felt = law.around and len(around) > 0
             skin = facets(np.concatenate([form.regions[other], around])) if felt else own[other]
-            passes.append(Pass(law, own[one], skin, (one, other)))
+            kind = RayPass if law.along_normals else Pass
+            passes.append(kind(law, own[one], skin, (one, other)))
             rims.append(Pass(law, own[one], facets(around), (one, other)) if len(around) and not felt else None)
         return passes, rims
 
@@ -107,10 +107,9 @@ class TouchingForces:
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
         """Add the forces to ``residual`` (n,), with their first-order change by ``moves`` (n,) of the unknowns."""
         self.look()
-        for _, one in self.now:
-            np.subtract.at(residual, one.dofs, one.forces[:, None] * one.rows[:, 0])
-        for rubbed in filter(None, self.rubbed):
-            np.subtract.at(residual, rubbed.dofs, np.einsum("nr,nrw->nw", rubbed.pull, rubbed.rows))
+        acting: list[PressedPoints | Rubbed] = [*(one for _, one in self.now), *filter(None, self.rubbed)]
+        for one in acting:
+            np.subtract.at(residual, one.dofs, np.einsum("nr,nrw->nw", one.pull, one.rows))
         if moves is not None and moves.any():
             residual += self.tangent() @ moves
 
@@ -119,6 +118,8 @@ class TouchingForces:
         self.look()
         size, found = len(self.seen), csr_array((len(self.seen), len(self.seen)))
         acting: list[PressedPoints | Rubbed] = [*(one for _, one in self.now), *filter(None, self.rubbed)]
+        mets = [(one, met) for one, (met, _) in zip(self.passes, self.now, strict=True)]
+        acting += [one.shaded(met) for one, met in mets if isinstance(one, RayPass) and isinstance(met, Hits)]
         for one in acting:
             count, five, width = one.rows.shape
             columns = np.broadcast_to(one.dofs[:, None], one.rows.shape).ravel()
@@ -138,7 +139,7 @@ class TouchingForces:
         for one, (met, contact), rubbed in zip(self.passes, self.now, self.rubbed, strict=True):
             if one.own is not None:  # the forces of a part on itself sum to 0
                 continue
-            forces, (here, there) = contact.forces[:, None] * met.there.normal, one.names  # on the points
+            forces, (here, there) = contact.force, one.names
             both = (1, f"{there} on {here}", met.here.point), (-1, f"{here} on {there}", met.there.point)
             for sign, name, places in both:
                 force, moment = found.get(name, (np.zeros(3), np.zeros(3)))
@@ -159,7 +160,6 @@ class TouchingForces:
         self.look()
         pairs = list(zip(self.passes, self.now, strict=True))
         removed = any(one.law.relaxed for one in self.passes)
-        gaps = np.concatenate([met.gap for met, _ in self.now])
         more = {"touching_overlap_at_rest": self.overlap} if removed else {}
         more |= {"touching_friction_work": self.dissipated} if any(self.rubbing) else {}
         most = dict[str, float]()
@@ -168,10 +168,10 @@ class TouchingForces:
             most[name] = max(most.get(name, 0.0), float(one.pressure(met)[0].max(initial=0.0)))
         more |= most if len(most) > 1 else {}
         return {
-            "touching_depth": max(0.0, -float(gaps.min(initial=0.0))),
+            "touching_depth": max(one.depth(met) for one, (met, _) in pairs),
             "touching_pressure": max(most.values()),
-            "touching_area": sum(float(one.areas[met.points].sum()) for one, (met, _) in pairs),
-            "touching_points": float(len(gaps)),
+            "touching_area": sum(float(one.areas[met.points] @ one.shares(met)) for one, (met, _) in pairs),
+            "touching_points": float(sum(len(np.unique(met.points)) for met, _ in self.now)),
         } | more
 
     def settle(self) -> None:

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, cKDTree
+from scipy.spatial import Delaunay
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.passing import passed, seen_along
 from fem_reference.problems.touching import Touching
 from fem_reference.solvers.fenicsx.facets import FacetPlaces, Facets
-from fem_reference.solvers.fenicsx.own_pairs import OwnPairs
+from fem_reference.solvers.fenicsx.own_pairs import OwnPairs, pairs
 
 # The degree of quadrature on facets; with 5, the pressure between two blocks with unrelated meshes is off by 5 instead of 2 %.
 _DEGREE = 8
@@ -24,6 +24,8 @@ _STAYS = 0.05
 _FACING = -0.5
 # In self-contact, a point behind a facet by less than this share of their radii and half thicknesses counts as in front.
 _DEEP = 0.125
+# The cosine between a normal and the opposite one up to which a point does not face a place, and contact has no pressure.
+GRAZING = 0.3
 _AT_ONCE = 100000  # pairs whose paths are followed together
 _BULGE = 1.25  # a facet bulges from a plane at most this times as far as its farthest node
 
@@ -50,14 +52,16 @@ class Met:
 @dataclass(frozen=True, eq=False)
 class PressedPoints:
     """Contact of n points: the unknowns ``dofs`` (n, a) of the nodes that carry them and the places they meet; in these, the first
-    derivatives ``rows`` (n, 5, a) of five: the gap, the position along two tangents and the facet's slopes along the normal; the
-    ``forces`` (n,) [N], and the second derivatives ``second`` (n, 5, 5) of the energy in the five.
+    derivatives ``rows`` (n, r, a) of five, the gap, the position along two tangents and the facet's slopes along the normal, or of
+    others; the ``pull`` (n, r) [N] along these, its derivative ``second`` (n, r, r), signed like an energy's second one, and the
+    ``force`` (n, 3) [N] on the points.
     """
 
     dofs: Ints
     rows: Floats
-    forces: Floats
+    pull: Floats
     second: Floats
+    force: Floats
 
 
 # The unknowns (n,) of a settled state, and the points that met facets in it, if known.
@@ -175,7 +179,16 @@ class Pass:
 
     def pressure(self, met: Met) -> tuple[Floats, Floats]:
         """Pressure (n,) [MPa] of points that ``met`` the other side, less that of overlaps at rest, and its slope in the gap."""
+        (whole, slope), shares = self.whole(met), self.shares(met)
+        return shares * whole, shares * slope
+
+    def whole(self, met: Met) -> tuple[Floats, Floats]:
+        """The ``pressure``, without shares, and its slope."""
         return self.law.pressure(met.gap + self.share * self.overlaps[met.points])
+
+    def shares(self, met: Met) -> Floats:
+        """The shares (n,) of the pressure that points have."""
+        return np.ones(len(met.gap))
 
     def let_fall(self, met: Met) -> None:
         """In self-contact whose overlap at rest stays, reduce what is subtracted until the points that ``met`` the other side just
@@ -183,7 +196,7 @@ class Pass:
         """
         if self.own and self.law.relaxed is None:
             left = np.zeros_like(self.overlaps)
-            left[met.points] = np.maximum(self.law.smoothing - met.gap, 0)
+            np.maximum.at(left, met.points, self.law.smoothing - met.gap)
             self.overlaps = np.minimum(self.overlaps, left)
 
     def pressed(self, met: Met) -> PressedPoints:
@@ -206,9 +219,20 @@ class Pass:
         second[:, 1:3, 1:3] = np.linalg.inv(there.metric) @ there.bend @ scaled
         second[:, 1:3, 3:5] = second[:, 3:5, 1:3] = scaled
         second[:, 3:5, 3:5] = met.gap[:, None, None] * scaled
-        dofs = np.concatenate([self.side.dofs[met.own], self.other.dofs[met.facets]], axis=1).reshape(count, width)
         areas = self.areas[met.points]
-        return PressedPoints(dofs, np.stack(rows, axis=1), areas * pressure, areas[:, None, None] * second)
+        pull = np.zeros((count, 5))
+        pull[:, 0] = areas * pressure
+        force = pull[:, :1] * there.normal
+        return PressedPoints(self._dofs(met), np.stack(rows, axis=1), pull, areas[:, None, None] * second, force)
+
+    def _dofs(self, met: Met) -> Ints:
+        """The unknowns (n, a) of the nodes that carry points and the places that they ``met``."""
+        dofs = np.concatenate([self.side.dofs[met.own], self.other.dofs[met.facets]], axis=1)
+        return dofs.reshape(len(dofs), 3 * dofs.shape[1])
+
+    def depth(self, met: Met) -> float:
+        """The greatest depth [mm] of the points that ``met`` the other side, less where their pressure fades."""
+        return float((-met.gap * self.shares(met)).max(initial=0.0))
 
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
         """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), without those that ``met``
@@ -216,24 +240,29 @@ class Pass:
         flat pieces of a facet may be in front, are also followed from in front, raised by at most the facet's reach, within which
         points are met. Points that end in front of a facet passed only its flat pieces.
         """
+        return self._passed_by(before, last, now, met.points, 0.0)
+
+    def _passed_by(self, before: Floats, last: Met, now: Floats, seen: Ints, deep: float) -> Ints:
+        """The points as in ``through``, without those ``seen``, or facing away from a facet at most ``deep`` [mm] before them."""
         starts, ends = self.places(before), self.places(now)
         free = np.ones(len(ends), bool)
-        free[met.points], none = False, np.zeros(0, np.int64)
+        free[seen], none = False, np.zeros(0, np.int64)
         old, new = self.other.nodes(before), self.other.nodes(now)
-        near = self.met(before, float(self.other.balls(old)[1].max()), None, (before, last))
+        near = Pass.met(self, before, float(self.other.balls(old)[1].max()), None, (before, last))
         near = near.some(np.flatnonzero(free[near.points]))
-        there = self.other.nearest(new, near.facets, ends[near.points])
-        gap = np.einsum("ni,ni->n", ends[near.points] - there.point, there.normal)
-        behind = near.points[(gap < 0) & (self.other.beyond(there.at) <= _BEYOND)]
         rise, reach, clear = np.zeros_like(starts), self._reach(old), self._heights(old, starts, none, none)[1]
         for one in (near, last):
             high = np.maximum(self.law.smoothing, clear[one.facets]) - one.gap
             rise[one.points] = np.clip(high, 0, reach[one.facets])[:, None] * one.there.normal
         paths = (starts, ends, free), (starts + rise, ends + rise, free & rise.any(axis=1))
-        points, facets = np.concatenate([self._passed(a, b, some, old, new) for a, b, some in paths], axis=1)
-        there = self.other.nearest(new, facets, ends[points])
-        front = (np.vecdot(ends[points] - there.point, there.normal) > 0) & (self.other.beyond(there.at) <= _BEYOND)
-        return np.union1d(behind, points[~front])
+        passed_by = [self._passed(a, b, some, old, new) for a, b, some in paths]
+        points, facets = np.concatenate([np.stack([near.points, near.facets]), *passed_by], axis=1)
+        there, first = self.other.nearest(new, facets, ends[points]), np.arange(len(points)) < len(near.points)
+        gap, on = np.vecdot(ends[points] - there.point, there.normal), self.other.beyond(there.at) <= _BEYOND
+        here = self._here(self.side.nodes(now), points)
+        beside = np.vecdot(here.normal, there.normal) > -GRAZING
+        safe = (gap > 0) | (beside & (gap > -deep))
+        return np.unique(points[np.where(first, on & ~safe & (gap < 0), ~(on & safe))])
 
     def _reach(self, nodes: Floats) -> Floats:
         """The depth (m,) [mm] to which facets with ``nodes`` (m, k, 3) are met: their radius or half the thickness."""
@@ -267,14 +296,3 @@ class Pass:
             found = passed(starts[points], ends[points], *corners).reshape(pieces.shape[:2]).any(axis=1)
             lost.append(np.stack([some, facets])[:, part[found]])
         return np.concatenate(lost, axis=1)
-
-
-def pairs(points: Floats, middles: Floats, reach: Floats) -> tuple[Ints, Ints]:
-    """Points (p,) and facets (p,) where the point is within ``reach`` (m,) [mm] of the ``middles`` (m, 3) of the facet."""
-    low, high = (middles - reach[:, None]).min(axis=0), (middles + reach[:, None]).max(axis=0)
-    near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
-    if not len(near):
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    found = cKDTree(points[near]).query_ball_point(middles, reach)
-    some = near[np.concatenate([np.asarray(one, np.int64) for one in found])]
-    return some, np.repeat(np.arange(len(middles)), [len(one) for one in found])

@@ -1,0 +1,234 @@
+"""Contact along the points' own normals: a point presses on the place where the line along its normal meets the other side.
+
+A point's own normal never jumps, and neighbouring facets meet the line at one place at their common edge. So forces are continuous
+there. A force and its reaction act along one line, so forces and moments balance to rounding, although they have no energy.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.solvers.fenicsx.facets import FacetPlaces
+from fem_reference.solvers.fenicsx.own_pairs import pairs
+from fem_reference.solvers.fenicsx.touching_passes import GRAZING, Met, Pass, PressedPoints, Settled
+
+_FRONTAL = 0.7  # the cosine as ``GRAZING`` from which there is all of the pressure
+# The distance beyond edges, in reference coordinates, over which the pressure ends where no other facet follows; without it a point
+# at a sharp edge would go on and off it.
+_WIDE = 0.1
+# Beyond an edge, in radii of the facet at rest: the depth at which its pressure ends, and the distance within which another place
+# takes a share of it.
+_SHALLOW, _NEAR = 0.25, 0.4
+_STAYS = 4.0  # beyond edges, the facet of the last search is taken unless another has this times its pressure
+_ON = 1e-7  # a place is on a facet up to this distance beyond its edges, in reference coordinates
+_AT = 0.02  # the same for the place nearest to a point
+
+
+def _step(x: Floats) -> tuple[Floats, Floats]:
+    """A smooth step (n,) from 0 at ``x`` = 0 to 1 at 1, and its derivative."""
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * (3 - 2 * x), 6 * x * (1 - x)
+
+
+def facing(here: FacetPlaces, there: FacetPlaces) -> tuple[Floats, Floats]:
+    """The share (n,) of the pressure by the cosine between the normals of places that face each other, and its derivative."""
+    share, slope = _step((-np.vecdot(here.normal, there.normal) - GRAZING) / (_FRONTAL - GRAZING))
+    return share, slope / (_FRONTAL - GRAZING)
+
+
+def _close(apart: Floats, near: Floats) -> tuple[Floats, Floats]:
+    """The closeness (n,) of places ``apart`` along a line, 0 from ``near`` [mm], and its derivative."""
+    share, slope = _step(1 - np.abs(apart) / near)
+    return share, -slope / near * np.sign(apart)
+
+
+@dataclass(frozen=True, eq=False)
+class Shades:
+    """Places on ``facets`` (k,) at gaps (k,) [mm] that take a share of the pressure from the hits ``of`` (k,), which are beyond
+    edges, within a distance ``near`` (k,) [mm].
+    """
+
+    of: Ints
+    facets: Ints
+    there: FacetPlaces
+    gap: Floats
+    near: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Hits(Met):
+    """Places that lines along normals hit; a point has at most one on a facet and one beyond an edge, which has the ``left`` (n,)
+    share of its pressure, according to the ``shades``.
+    """
+
+    left: Floats
+    shades: Shades
+
+
+@dataclass(frozen=True, eq=False)
+class Changes:
+    """The nine quantities of n hits, with derivatives ``rows`` (n, 9, a): x - y (3), the own slopes along the own normal (2), and
+    the other slopes along the other normal (2) and along the own one (2). By these, the changes of the own normal ``turn``
+    (n, 3, 9), the place ``slid`` (n, 2, 9), the gap ``opened`` (n, 9) and the cosine between the normals (n, 9).
+    """
+
+    rows: Floats
+    turn: Floats
+    slid: Floats
+    opened: Floats
+    cosine: Floats
+
+
+def changes(here: FacetPlaces, there: FacetPlaces, gap: Floats) -> Changes:
+    """The first-order changes of hits, from ``y = x + g n``."""
+    n, other = here.normal, there.normal
+    count, k = here.basis.shape
+    rows = np.zeros((count, 9, k + there.basis.shape[1], 3))
+    rows[:, :3] = np.concatenate([here.basis, -there.basis], axis=1)[:, None, :, None] * np.eye(3)[:, None]
+    rows[:, 3:5, :k] = here.slopes[:, :, :, None] * n[:, None, None]
+    rows[:, 5:7, k:] = there.slopes[:, :, :, None] * other[:, None, None]
+    rows[:, 7:9, k:] = there.slopes[:, :, :, None] * n[:, None, None]
+    turn = np.zeros((count, 3, 9))
+    turn[:, :, 3:5] = -np.swapaxes(np.linalg.inv(here.metric) @ here.tangents, 1, 2)
+    moved = gap[:, None, None] * turn
+    moved[:, :, :3] += np.eye(3)
+    across = np.stack([there.tangents[:, 0], there.tangents[:, 1], -n], axis=2)
+    solved = np.linalg.solve(across, moved)
+    bent = there.bend @ solved[:, :2]
+    bent[:, [0, 1], [5, 6]] += 1
+    dual = np.linalg.inv(there.metric) @ there.tangents
+    cosine = np.einsum("ni,nai,nar->nr", n, dual, bent) - np.einsum("ni,nir->nr", other, turn)
+    return Changes(rows.reshape(count, 9, 3 * rows.shape[2]), turn, solved[:, :2], solved[:, 2], cosine)
+
+
+class RayPass(Pass):
+    """Points of one side whose own normals meet facets of the other."""
+
+    def met(self, unknowns: Floats, most: float, last: Met | None = None, _: Settled | None = None) -> Hits:
+        """The hits of lines along the points' normals at gaps up to ``most`` [mm] along these, as deep as in ``Pass.met``. The
+        first crossing behind a point, and in front of it, decides: if it faces away, the point is not inside, or not outside.
+        """
+        nodes = self.other.nodes(unknowns)
+        some, facets, here = self._lines(unknowns, nodes, most)
+        there, gap = self.other.along(nodes, facets, here.point, here.normal)
+        beyond, share = self.other.beyond(there.at), facing(here, there)[0]
+        felt = (gap < most) & (gap > -self._reach(nodes)[facets]) & (share > 0)
+        on = np.flatnonzero(beyond <= _ON)
+        far = np.abs(gap) - _ON * share  # at a common edge, the facet that faces the point
+        first = on[_first(2 * some[on] + (gap[on] < 0), far[on])]
+        hits = first[felt[first]]
+        hits = hits[_first(some[hits], far[hits])]
+        size = self.other.balls(self.other.rest)[1][facets]
+        out = np.flatnonzero((beyond > _ON) & (beyond < _WIDE) & felt)
+        left, shade = np.ones(len(some)), np.full(len(some), -1)
+        for one, by in _of_same(some, out, on[share[on] > 0]):
+            rest = 1 - share[by] * _close(gap[one] - gap[by], _NEAR * size[one])[0]
+            less = rest < left[one]
+            left[one[less]], shade[one[less]] = rest[less], by[less]
+        ends = self._ends(there.at[out], gap[out], facets[out])[0]
+        full = (left * share)[out] * ends * self.law.pressure(gap[out])[0]
+        if last is not None:
+            stays = np.isin(some[out] * len(nodes) + facets[out], last.points * len(nodes) + last.facets)
+            full[stays] *= _STAYS
+        out, full = out[full > 0], full[full > 0]
+        found = np.sort(np.concatenate([hits, out[_first(some[out], -full)]]))
+        of = np.flatnonzero((shade[found] >= 0) & (left[found] > 0) & (beyond[found] > _ON))
+        by = shade[found[of]]
+        shades = Shades(of, facets[by], there[by], gap[by], _NEAR * size[found[of]])
+        own, points = some[found] // self.each, some[found]
+        left[hits] = 1.0
+        return Hits(points, own, here[found], facets[found], there[found], gap[found], left[found], shades)
+
+    def _lines(self, unknowns: Floats, nodes: Floats, most: float) -> tuple[Ints, Ints, FacetPlaces]:
+        """Pairs of points and facets (p,) that lines along normals may hit, and the points' places on their own facets."""
+        points, (middles, radii) = self.places(unknowns), self.other.balls(nodes)
+        some, facets = self._near(points, (middles, radii), radii + np.maximum(radii, most), 0 * points[:, 0], nodes)
+        height, bulge = self._heights(nodes, points, some, facets)
+        kept = np.abs(height) < (np.maximum(self._reach(nodes), most) + bulge)[facets]
+        some, facets = some[kept], facets[kept]
+        here = self._here(self.side.nodes(unknowns), some)
+        away = middles[facets] - here.point
+        kept = np.vecdot(away, away) - np.vecdot(away, here.normal) ** 2 <= radii[facets] ** 2
+        return some[kept], facets[kept], here[np.flatnonzero(kept)]
+
+    def _ends(self, at: Floats, gap: Floats, facets: Ints) -> tuple[Floats, Floats, Floats]:
+        """The share (n,) of the pressure beyond edges, and its derivatives by the place (n, 2) and the gap (n,)."""
+        size, (beyond, leaving) = _SHALLOW * self.other.balls(self.other.rest)[1][facets], self.other.leaving(at)
+        (wide, by_place), (shallow, by_gap) = _step(1 - beyond / _WIDE), _step(2 + 2 * gap / size)
+        out = beyond > _ON
+        by_gap, shallow = np.where(out, 2 * by_gap / size, 0.0), np.where(out, shallow, 1.0)
+        return wide * shallow, -(by_place * shallow / _WIDE)[:, None] * leaving, wide * by_gap
+
+    def shares(self, met: Met) -> Floats:
+        """The shares (n,) of the pressure that hits have."""
+        assert isinstance(met, Hits)  # found by ``met``
+        return met.left * facing(met.here, met.there)[0] * self._ends(met.there.at, met.gap, met.facets)[0]
+
+    def pressed(self, met: Met) -> PressedPoints:
+        """The contact of hits: the force of the pressure along the own normal."""
+        assert isinstance(met, Hits)  # found by ``met``
+        by, n = changes(met.here, met.there, met.gap), met.here.normal
+        whole, slope = self.whole(met)
+        cosine, turned = facing(met.here, met.there)
+        ends, by_place, by_gap = self._ends(met.there.at, met.gap, met.facets)
+        areas, pressure = self.areas[met.points], whole * met.left * cosine * ends
+        rise = (cosine * (slope * ends + whole * by_gap))[:, None] * by.opened
+        rise += (whole * turned * ends)[:, None] * by.cosine
+        rise += (whole * cosine)[:, None] * np.einsum("na,nar->nr", by_place, by.slid)
+        rise *= met.left[:, None]
+        second, pull = np.zeros((len(n), 9, 9)), np.zeros((len(n), 9))
+        second[:, :3] = n[:, :, None] * rise[:, None] + pressure[:, None, None] * by.turn
+        second[:, 7:9] = -pressure[:, None, None] * by.slid
+        pull[:, :3] = -(areas * pressure)[:, None] * n
+        return PressedPoints(self._dofs(met), by.rows, pull, areas[:, None, None] * second, pull[:, :3])
+
+    def shaded(self, met: Hits) -> PressedPoints:
+        """The change of forces beyond edges with the places that take a share of them: a tangent without forces."""
+        of, shades = met.shades.of, met.shades
+        here, there = met.here[of], met.there[of]
+        hit, shade = changes(here, there, met.gap[of]), changes(here, shades.there, shades.gap)
+        (share, turned), (close, parted) = facing(here, shades.there), _close(met.gap[of] - shades.gap, shades.near)
+        by_shade = (turned * close)[:, None] * shade.cosine - (share * parted)[:, None] * shade.opened
+        own, other = 3 * here.basis.shape[1], 3 * there.basis.shape[1]
+        rows = np.zeros((len(of), 4, own + 2 * other))
+        rows[:, :3, : own + other] = hit.rows[:, :3]
+        rows[:, 3, : own + other] = np.einsum("nr,nrw->nw", (share * parted)[:, None] * hit.opened, hit.rows)
+        taken = np.einsum("nr,nrw->nw", by_shade, shade.rows)
+        rows[:, 3, :own] += taken[:, :own]
+        rows[:, 3, own + other :] = taken[:, own:]
+        second, areas = np.zeros((len(of), 4, 4)), self.areas[met.points[of]]
+        second[:, :3, 3] = -(areas * self.pressure(met)[0][of] / met.left[of])[:, None] * here.normal
+        dofs = np.concatenate([self._dofs(met)[of], self.other.dofs[shades.facets].reshape(len(of), other)], axis=1)
+        return PressedPoints(dofs, rows, np.zeros((len(of), 4)), second, np.zeros((len(of), 3)))
+
+    def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
+        """The points (k,) that went through, as in ``Pass``, also without those that ``Pass`` would meet no deeper than contact is,
+        as their lines are grazing or blocked; and without those that end in front of the nearest place, and face it: they slid
+        round an edge.
+        """
+        near, deep = Pass.met(self, now, self.law.smoothing, None, (before, last)), self.law.smoothing + self.depth(met)
+        lost = self._passed_by(before, last, now, np.union1d(near.points[near.gap > -deep], met.points), deep)
+        nodes, points = self.other.nodes(now), self.places(now)[lost]
+        middles, radii = self.other.balls(nodes)
+        some, facets = pairs(points, middles, 2 * radii)
+        there = self.other.nearest(nodes, facets, points[some])
+        on = np.flatnonzero(self.other.beyond(there.at) <= _AT)
+        on = on[_first(some[on], np.linalg.norm(points[some[on]] - there.point[on], axis=1))]
+        here, there = self._here(self.side.nodes(now), lost[some[on]]), there[on]
+        front = (np.vecdot(here.point - there.point, there.normal) > 0) & (facing(here, there)[0] > 0)
+        return np.delete(lost, some[on][front])
+
+
+def _first(keys: Ints, values: Floats) -> Ints:
+    """The positions (k,) of the least of the ``values`` (n,) with each of the ``keys`` (n,)."""
+    order = np.lexsort((values, keys))
+    return np.asarray(order[np.unique(keys[order], return_index=True)[1]])
+
+
+def _of_same(points: Ints, one: Ints, other: Ints) -> list[tuple[Ints, Ints]]:
+    """Pairs of members of ``one`` (n,) and ``other`` (m,), numbers among ``points``, of the same point, in lists."""
+    other = other[np.argsort(points[other], kind="stable")]
+    low, high = (np.searchsorted(points[other], points[one], side) for side in ("left", "right"))
+    has = [np.flatnonzero(low + i < high) for i in range(int((high - low).max(initial=0)))]
+    return [(one[some], other[low[some] + i]) for i, some in enumerate(has)]

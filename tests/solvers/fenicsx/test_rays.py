@@ -1,0 +1,126 @@
+"""Contact along own normals: forces balance, are continuous across creases and sharp edges, and have an exact tangent."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCSx is not installed")
+
+from fem_reference.solvers.fenicsx.rays import Hits, RayPass, facing
+from fem_reference.solvers.fenicsx.touching import TouchingForces
+from tests.solvers.fenicsx.test_touching_passes import KINDS, K, crumpled, nearest, over_a_block, residual
+
+
+def hits(contact: TouchingForces, one: int = 1) -> Hits:
+    contact.look()
+    found = contact.now[one][0]
+    assert isinstance(found, Hits)
+    return found
+
+
+@pytest.mark.parametrize("element", KINDS)
+@pytest.mark.parametrize("rough", [1, 5])
+def test_forces_balance_and_their_tangent_is_exact(element, rough) -> None:
+    contact, displacement = crumpled(element)
+    unknowns, dofs = contact.unknowns.x.array, displacement.dofs
+    unknowns *= rough
+    forces, tangent, start = residual(contact), contact.tangent(), np.array(unknowns)
+    found = [hits(contact, i) for i in (0, 1)]
+    assert all(isinstance(one, RayPass) for one in contact.passes)
+    assert min(len(met.gap) for met in found) > 5
+    beyond = [one.other.beyond(met.there.at) for one, met in zip(contact.passes, found, strict=True)]
+    assert sum((far > 0.01).sum() for far in beyond) > 2  # sharp edges take part
+    shares = [facing(met.here, met.there)[0] for met in found]
+    # And steep places, on curved facets.
+    assert rough == 1 or element[1] == "1" or sum((share < 0.99).sum() for share in shares) > 2
+    direction, step, ends = np.zeros_like(unknowns), 1e-7, []
+    direction[dofs] = np.random.default_rng(2).normal(size=dofs.shape)
+    for sign in (1, -1):
+        unknowns[:] = start + sign * step * direction
+        ends.append(residual(contact))
+    # Central differences of numbers of the order of 1e-3, with lengths of 0.05: the square of the step, and rounding over it.
+    assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(tangent @ direction, abs=1e-8)
+    unknowns[:] = start
+    nodal, places = forces[dofs], displacement.space.tabulate_dof_coordinates() + start[dofs]
+    assert np.abs(nodal).sum() > 1e-3
+    assert nodal.sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-16)
+    assert np.cross(places, nodal).sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-16)
+    sums = np.sum([np.concatenate(pair) for pair in contact.forces().values()], axis=0)
+    assert sums == pytest.approx(np.zeros(6), abs=1e-15)
+
+
+def greatest_jump(contact: TouchingForces, upper: np.ndarray, count: int, path: tuple[np.ndarray, ...]) -> float:
+    """The greatest change of the force on the points of a plate in ``count`` steps along a straight path."""
+    forces = []
+    for share in np.linspace(0, 1, count + 1):
+        contact.unknowns.x.array[upper] = path[0] + share * (path[1] - path[0])
+        contact.look()
+        forces.append(contact.now[1][1].force.sum(axis=0))
+    return float(np.abs(np.diff(forces, axis=0)).max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slope", [0.5, 2.5])
+@pytest.mark.parametrize("element", KINDS)
+def test_forces_are_continuous_across_a_ridge_and_a_sharp_edge(element, slope) -> None:
+    """The plate goes over a block with a ridge along x = 0.5, whose right side falls by ``slope``, 0.02 deep in its left side and
+    beyond its end. On the steep side, of a cosine of 0.37, contact fades: it begins from 0.3. In ten times as many steps, forces
+    change by a tenth. To the nearest place, they jump.
+    """
+    contact, upper = over_a_block(element)
+    one = contact.passes[1]
+    contact.unknowns.x.array[one.other.dofs[..., 2]] = -slope * np.maximum(one.other.rest[..., 0] - 0.5, 0)
+    for ends in ((0.3, 0.7), (0.2, -0.3)):
+        path = tuple(np.array([x - 0.5, 0.0, 0.48 - 1.5]) for x in ends)
+        few, many = (greatest_jump(contact, upper, count, path) for count in (60, 600))
+        assert few > 1e-6
+        assert many < 0.2 * few
+    path = tuple(np.array([x - 0.5, 0.0, 0.48 - 1.5]) for x in (0.2, -0.3))
+    nearest(contact)
+    few, many = (greatest_jump(contact, upper, count, path) for count in (60, 600))
+    assert many > 0.5 * few
+
+
+def test_contact_fades_where_places_do_not_face_a_point() -> None:
+    """A plate is 0.02 deep in a flat block that is turned beneath it: the pressure is the law's, by the length of the line."""
+    for slope, share in ((0.0, 1.0), (0.9, 1.0), (4.0, 0.0)):
+        contact, upper = over_a_block("P2/P1")
+        one, unknowns = contact.passes[1], contact.unknowns.x.array
+        unknowns[one.other.dofs[..., 2]] = slope * (one.other.rest[..., 0] - 0.5)
+        unknowns[upper] = [0.0, 0.0, -1.02]
+        met = hits(contact)
+        assert len(met.points) == (len(one.areas) if share else 0)
+        if share:
+            height = one.places(unknowns)[met.points] - [0.5, 0.0, 0.5]
+            assert met.gap == pytest.approx(height[:, 2] - slope * height[:, 0], abs=1e-14)
+            assert one.pressure(met)[0] == pytest.approx(K * np.maximum(-met.gap, 0), abs=K * 0.02 / 4)
+
+
+def test_the_first_crossing_decides() -> None:
+    """Points below a block are not in it, although the line behind them meets its top from below; from inside, they are in it."""
+    contact, upper = over_a_block("Q1/P0")
+    one, unknowns = contact.passes[1], contact.unknowns.x.array
+    unknowns[upper] = [0.0, 0.0, -1.1]
+    assert len(hits(contact).points) == len(one.areas)
+    # The right half of the top, folded over the left half, faces down: it is the first that the line meets.
+    right = one.other.rest[..., 0] > 0.5
+    unknowns[one.other.dofs[right]] = np.stack(
+        [1 - 2 * one.other.rest[right][:, 0], 0 * right[right], -0.05 + 0 * right[right]], 1
+    )
+    unknowns[upper] = [-0.2, 0.0, -1.1]
+    assert not len(hits(contact).points)
+
+
+@pytest.mark.parametrize("element", KINDS)
+def test_points_that_slide_round_an_edge_are_not_lost_and_those_that_go_through_are(element) -> None:
+    """The plate begins on the left side of a ridge of 90 degrees, and ends in front of its right side, or below both."""
+    for end, went in (([0.3, 0.0, -1.2], False), ([0.1, 0.0, -2.4], True)):
+        contact, upper = over_a_block(element)
+        one, unknowns = contact.passes[1], contact.unknowns.x.array
+        unknowns[one.other.dofs[..., 2]] = -np.abs(one.other.rest[..., 0] - 0.5)
+        unknowns[upper] = [-0.1, 0.0, -1.09]
+        contact.settle()
+        before, last, unknowns[upper] = np.array(unknowns), hits(contact), end
+        contact.look()
+        lost = one.through(before, last, contact.seen, contact.now[1][0])
+        assert len(last.points) > 0
+        assert len(lost) == went * len(one.areas)
