@@ -21,7 +21,7 @@ _ROUNDED = 0.5  # the rounding of a share published without decimals, in per cen
 _WHOLE = 100.0  # all poses, in per cent
 _READ = ("publication", "abstract", "quotation", "memory")  # the texts in which numbers were read, the best first
 # "outside": the model differs from some measurement by more than its uncertainty, even if it agrees with other measurements.
-Grade = Literal["validated", "indicative", "outside", "verified only", "not measured"]
+Grade = Literal["validated", "indicative", "outside", "verified only", "not compared"]
 
 
 class Evidence(Record):
@@ -122,11 +122,11 @@ class Row:
     @property
     def grade(self) -> Grade:
         """The grade: "outside" if one measurement is not met, else "validated" if some measurement counts as validation, else
-        "indicative"; "verified only" without a known experiment, "not measured" without its results. Other models do not count.
+        "indicative"; "verified only" without a known experiment, "not compared" without its results. Other models do not count.
         """
         met, of = self.measured
         if of == 0:
-            return "not measured" if self.claim.arms or self.claim.experiments else "verified only"
+            return "not compared" if self.claim.arms or self.claim.experiments else "verified only"
         if met < of:
             return "outside"
         return "validated" if any(one.validates for one in self.beside) else "indicative"
@@ -172,10 +172,10 @@ def of_result(found: Result) -> Beside:
 
 def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> str:
     """The least reliable text in which ``facts`` were read, and notes on a tolerance chosen here and a model from memory."""
-    read = max((one.read_in for one in facts), key=_READ.index, default="not known")
+    read = max((one.read_in for one in facts), key=_READ.index, default="not known").replace("memory", "recalled")
     chosen = not is_order and not (facts and all(one.sd for one in facts))
     remembered = from_memory and all(one.doi_confirmed == "yes" for one in facts)
-    return f"{read}{'; ± chosen by us' if chosen else ''}{'; a part of the model from memory' if remembered else ''}"
+    return f"{read}{'; ± chosen by us' if chosen else ''}{'; part of the model recalled' if remembered else ''}"
 
 
 def of_arms(arms: ArmsBeside) -> Beside:

@@ -77,7 +77,7 @@ def test_a_grade_is_as_good_as_the_comparisons() -> None:
     )
     assert graded().grade == "verified only"
     asked = replace(graded(), claim=CLAIM.model_copy(update={"arms": True}))
-    assert asked.grade == "not measured", "without the data a quantity is no better than with it"
+    assert asked.grade == "not compared", "without the data a quantity is no better than with it"
     assert graded(within).grade == "validated"
     assert graded(quoted).grade == "indicative"
     assert graded(quoted, within).grade == "validated"
@@ -99,7 +99,7 @@ def test_what_is_quoted_remembered_or_unknown_never_validates(known, from_memory
 def test_what_a_comparison_rests_on_is_said() -> None:
     """The worst text that one of its numbers was read in; a tolerance where one has no deviation, but not of an order."""
     assert of_result(measured(1.0)).rests_on == "abstract"
-    assert of_result(measured(1.0, from_memory=True)).rests_on == "abstract; a part of the model from memory"
+    assert of_result(measured(1.0, from_memory=True)).rests_on == "abstract; part of the model recalled"
     assert of_result(measured(1.0, known=(*SARCOMERES, *QUOTED))).rests_on == "quotation; ± chosen by us"
     assert of_result(measured(1.0, known=QUOTED, from_memory=True)).rests_on == "quotation; ± chosen by us", (
         "of the DOI"
@@ -139,7 +139,7 @@ def test_other_models_are_counted_apart_and_decide_no_grade() -> None:
     assert (one.measured, one.models, one.grade) == ((1, 1), (1, 2), "indicative")
     assert graded(beyond, near).grade == "outside"
     assert graded(near).grade == "verified only"
-    assert replace(graded(far), claim=CLAIM.model_copy(update={"arms": True})).grade == "not measured"
+    assert replace(graded(far), claim=CLAIM.model_copy(update={"arms": True})).grade == "not compared"
     assert len(one.misses) == 1, "the bias is that from measurements"
 
 
