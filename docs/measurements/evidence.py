@@ -149,7 +149,12 @@ def _credibility_cubes() -> str:
 
 
 def _rests(one: dict[str, Any]) -> str:
-    return f"{credibility_page.source(one['experiment'])}: {one['rests_on']}"
+    return f"{credibility_page.source(one['experiment'])}: {_recalled(one['rests_on'])}"
+
+
+def _recalled(text: str) -> str:
+    """Where a number was read; the page explains the word recalled."""
+    return text.replace("from memory", "recalled").replace("memory", "recalled")
 
 
 def _where(one: dict[str, Any]) -> str:
@@ -166,7 +171,7 @@ def _credibility_sources() -> str:
         own = [one for one in found if one["experiment"] == name and one["kind"] == "measurement"]
         if own:
             met, n = f"{sum(one['met'] for one in own)} of {len(own)}", own[0]["n"] or "not known"
-            rests = " / ".join(dict.fromkeys(one["rests_on"] for one in own))
+            rests = " / ".join(dict.fromkeys(_recalled(one["rests_on"]) for one in own))
             rows.append((credibility_page.source(name), record.specimen, n, met, rests))
     return table("credibility", ("source", "specimens", "n", "reproduced", "source of its numbers"), rows)
 

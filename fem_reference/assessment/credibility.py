@@ -122,7 +122,7 @@ class Row:
     @property
     def grade(self) -> Grade:
         """The grade: "outside" if one measurement is not met, else "validated" if some measurement counts as validation, else
-        "indicative"; "verified only" without a known experiment, "not compared" without its results. Other models do not count.
+        "indicative"; "verified only" without a known experiment, "not measured" without its results. Other models do not count.
         """
         met, of = self.measured
         if of == 0:
@@ -172,10 +172,10 @@ def of_result(found: Result) -> Beside:
 
 def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> str:
     """The least reliable text in which ``facts`` were read, and notes on a tolerance chosen here and a model from memory."""
-    read = max((one.read_in for one in facts), key=_READ.index, default="not known").replace("memory", "recalled")
+    read = max((one.read_in for one in facts), key=_READ.index, default="not known")
     chosen = not is_order and not (facts and all(one.sd for one in facts))
     remembered = from_memory and all(one.doi_confirmed == "yes" for one in facts)
-    return f"{read}{'; ± chosen by us' if chosen else ''}{'; part of the model recalled' if remembered else ''}"
+    return f"{read}{'; ± chosen by us' if chosen else ''}{'; a part of the model from memory' if remembered else ''}"
 
 
 def of_arms(arms: ArmsBeside) -> Beside:

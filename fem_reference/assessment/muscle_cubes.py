@@ -107,7 +107,7 @@ def _pulled(name: str, title: str, condition: str, axis: int) -> Quantity:
     """A Poisson ratio in tension across the fibres."""
     fact, title = find(TAKAZA, "poisson_ratio", condition), f"Strip pulled across its fibres: Poisson ratio {title}"
     return Quantity(
-        name, title, TAKAZA, poisson(STRETCHED, 90, axis), (fact,), fact.value, 0.1, "Recalled: 0.1.", _BARE
+        name, title, TAKAZA, poisson(STRETCHED, 90, axis), (fact,), fact.value, 0.1, "From memory: 0.1.", _BARE
     )
 
 
@@ -117,7 +117,7 @@ def _ratio_by_symmetry() -> Quantity:
     truth = along.value / across.value
     within = truth * math.hypot(0.05 / along.value, 0.05 / across.value)
     because = "The ratio of two Poisson ratios, 0.5 and 0.36, each known to within 0.05."
-    title = "Cube in compression: ratio of stress along the fibres to stress across them"
+    title = "Cube in compression: stress along the fibres over stress across them"
     of = stiffness_ratio(SQUEEZED)
     return Quantity("cube_stiffness_ratio", title, LOOCKE, of, (along, across), truth, within, because, _TENSION_ONLY)
 
@@ -128,14 +128,14 @@ def _confinement() -> Quantity:
     because = (
         "The standard deviation of the ratio of two stresses, -36.7 and -7.7 kPa; their strain is not in the abstract."
     )
-    title = "Semi-confined compression, fibres lengthen: ratio of stress to that in unconfined compression across the fibres"
+    title = "Semi-confined compression, fibres lengthen: stress over stress in unconfined compression across the fibres"
     return Quantity("cube_confinement", title, WALTER, confinement, facts, truth, sd, because)
 
 
 def _tension() -> Quantity:
     facts = tuple(find(TAKAZA, "axial_stress", f"{words} the fibres") for words in ("along", "across"))
-    title = "Strip at a stretch of 1.1: ratio of stress along the fibres to stress across them"
-    because = "Both stresses are recalled, without deviations: the tolerance is the ratio itself."
+    title = "Strip at a stretch of 1.1: stress along the fibres over stress across them"
+    because = "Both stresses are from memory, without deviations: the tolerance is the ratio itself."
     truth = facts[0].value / facts[1].value
     of = stiffness_ratio(STRETCHED)
     return Quantity("strip_stiffness_ratio", title, TAKAZA, of, facts, truth, truth, because, _BARE)

@@ -18,8 +18,8 @@ from fem_reference.report.pages import Page
 COMMON = (0.0, 57.0)  # flexion of the hip [deg] that every case completes
 GRADES = {
     "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract; no part of the "
-    "model is recalled",
-    "indicative": "within the uncertainty of every measurement, but each is from one specimen, a quotation, a fit or recalled",
+    "model is from memory",
+    "indicative": "within the uncertainty of every measurement, but each is from one specimen, a quotation, a fit or memory",
     "outside": "the model differs from a measurement of muscle by more than its uncertainty, or a measured moment arm is not "
     "within the range of the fibres in all poses",
     "verified only": "the equations are solved correctly; no measurement of muscle is compared with it",
@@ -82,7 +82,7 @@ def differences(row: Row, arms: Iterable[ArmsBeside]) -> str:
     if lost := sum(map(math.isnan, missed)):
         said.append(f"{lost} without a number")
     if orders:
-        said.append(f"{sum(not one.met for one in orders)} of {len(orders)} stiffness rankings wrong")
+        said.append(f"{sum(not one.met for one in orders)} of {len(orders)} orders of stiffness wrong")
     return "; ".join(said)
 
 

@@ -154,8 +154,8 @@ def _indented(name: str, share: str, depth: float, pinned: float) -> Entry:
     spread = (_MU.sd or math.nan) / _MU.value
     return EXPERIMENT(
         name=name,
-        title=f"Sphere pressed across the fibres into an idealised tibialis anterior, by a {share} of its thickness: ratio "
-        "of force to that of a law fitted to indentations",
+        title=f"Ball pressed across the fibres into an idealised tibialis anterior, by a {share} of its thickness: force "
+        "over that of a law fitted to indentations",
         unit="1",
         measure=indentation,
         given={"depth": depth, "mu": MU},
@@ -177,7 +177,7 @@ def _indented(name: str, share: str, depth: float, pinned: float) -> Entry:
 ENTRIES = (
     EXPERIMENT(
         name="vastus_stretch",
-        title="Idealised vastus lateralis with aponeurosis, knee flexed from 50 to 110 degrees: fibre stretch",
+        title="Idealised vastus lateralis with aponeurosis, knee flexed from 50 to 110 degrees: stretch of its fibres",
         unit="1",
         measure=vastus_stretch,
         given={"arm": ARM},

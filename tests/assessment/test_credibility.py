@@ -99,7 +99,7 @@ def test_what_is_quoted_remembered_or_unknown_never_validates(known, from_memory
 def test_what_a_comparison_rests_on_is_said() -> None:
     """The worst text that one of its numbers was read in; a tolerance where one has no deviation, but not of an order."""
     assert of_result(measured(1.0)).rests_on == "abstract"
-    assert of_result(measured(1.0, from_memory=True)).rests_on == "abstract; part of the model recalled"
+    assert of_result(measured(1.0, from_memory=True)).rests_on == "abstract; a part of the model from memory"
     assert of_result(measured(1.0, known=(*SARCOMERES, *QUOTED))).rests_on == "quotation; ± chosen by us"
     assert of_result(measured(1.0, known=QUOTED, from_memory=True)).rests_on == "quotation; ± chosen by us", (
         "of the DOI"
