@@ -41,7 +41,14 @@ def _bodies_rows() -> str:
         said = _where(beside[one["name"]]), _rests(beside[one["name"]])
         rows.append((title, number(one["value"]), f"{one['ladder'][0][1]:.4g}", measured, *said))
     coarse = "on cells twice as large, in half as many load steps"
-    head = ("body and quantity", "shipped material", coarse, "measured; for the sphere the fitted law", "result", _RESTS)
+    head = (
+        "body and quantity",
+        "shipped material",
+        coarse,
+        "measured; for the sphere the fitted law",
+        "result",
+        _RESTS,
+    )
     return table("bodies", head, rows)
 
 
@@ -97,7 +104,14 @@ def _credibility_grades() -> str:
         said = (claim.compared or "nothing", met, one["differences"], one["specimens"] or "none", models)
         rows.append((one["quantity"], f"**{one['grade']}**", *said, " to ".join(one["band"]) or "not known"))
     experiment = ("measurements reproduced", "deviation of the others", "specimens, by source")
-    head = ("quantity", "grade", "compared", *experiment, "agreement with other models (does not count as evidence)", "model band")
+    head = (
+        "quantity",
+        "grade",
+        "compared",
+        *experiment,
+        "agreement with other models (does not count as evidence)",
+        "model band",
+    )
     return table("credibility", head, rows)
 
 
