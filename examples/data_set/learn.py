@@ -49,12 +49,9 @@ def errors(folder: str) -> Iterator[dict]:
             for i, (one, rows) in enumerate(test):
                 found = learned(fit, [train[i]] if split == "pose" else train, one, rows) if fit else blended(one)[rows]
                 away.append(np.linalg.norm(found - one["positions"][rows], axis=2).mean())
-            row = {
-                "split": split,
-                "solver": fit.__name__ if fit else "linear blend skinning",
-                "learned": fit is not None,
-            }
-            yield row | {"error": np.mean(away), "muscles": len(test), "seconds": time.process_time() - begin}
+            name, seconds = fit.__name__ if fit else "linear blend skinning", time.process_time() - begin
+            row = {"split": split, "solver": name, "learned": fit is not None}
+            yield row | {"error": np.mean(away), "muscles": len(test), "seconds": seconds}
 
 
 if __name__ == "__main__":
