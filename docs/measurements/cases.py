@@ -27,7 +27,7 @@ def _comparison_worst() -> str:
     measured = kept("hip_flexion")["measured"]
     columns = {
         ("surface_deviation", "rms"): "surface, rms",
-        ("fibre_length", "max"): "worst fibre",
+        ("fibre_length", "max"): "fibre with the greatest error",
         ("volume", "deviation"): "volume",
         ("penetration", "deepest"): "deepest in a bone",
     }

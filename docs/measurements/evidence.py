@@ -40,8 +40,15 @@ def _bodies_rows() -> str:
         measured = f"{number(one['truth'])} ± {number(one['within'], 2)}"
         said = _where(beside[one["name"]]), _rests(beside[one["name"]])
         rows.append((title, number(one["value"]), f"{one['ladder'][0][1]:.4g}", measured, *said))
-    coarse = "on cells twice as large, in half the load steps"
-    head = ("body and quantity", "shipped material", coarse, "measured; for the ball the fitted law", "result", _RESTS)
+    coarse = "on cells twice as large, in half as many load steps"
+    head = (
+        "body and quantity",
+        "shipped material",
+        coarse,
+        "measured; for the sphere the fitted law",
+        "result",
+        _RESTS,
+    )
     return table("bodies", head, rows)
 
 
@@ -55,7 +62,7 @@ def _verify_groups() -> str:
         (name, len(ones), ", ".join(sorted({one["kind"] for one in ones})), number(max(map(_share, ones)), 2))
         for name, ones in groups.items()
     ]
-    return table("verify", ("group", "entries", "truth", "greatest share of a tolerance"), rows)
+    return table("verify", ("group", "entries", "truth", "greatest ratio of error to tolerance"), rows)
 
 
 def _share(entry: dict[str, Any]) -> float:
@@ -96,8 +103,15 @@ def _credibility_grades() -> str:
         met, models = (f"{one[kind]['met']} of {one[kind]['of']}" if one[kind]["of"] else "none" for kind in _BESIDE)
         said = (claim.compared or "nothing", met, one["differences"], one["specimens"] or "none", models)
         rows.append((one["quantity"], f"**{one['grade']}**", *said, " to ".join(one["band"]) or "not known"))
-    experiment = ("measurements met", "deviation of the others", "specimens, by source")
-    head = ("quantity", "grade", "compared", *experiment, "other models matched (no evidence)", "model band")
+    experiment = ("measurements reproduced", "deviation of the others", "specimens, by source")
+    head = (
+        "quantity",
+        "grade",
+        "compared",
+        *experiment,
+        "agreement with other models (does not count as evidence)",
+        "model band",
+    )
     return table("credibility", head, rows)
 
 
@@ -114,7 +128,7 @@ def _credibility_verified() -> str:
         "closed forms; entries of the catalogue",
         "required orders of convergence",
         "other codes",
-        "numerical bar, of shipped cases",
+        "numerical error bar, shipped cases",
     )
     return table("credibility", head, rows)
 
@@ -149,7 +163,12 @@ def _credibility_cubes() -> str:
 
 
 def _rests(one: dict[str, Any]) -> str:
-    return f"{credibility_page.source(one['experiment'])}: {one['rests_on']}"
+    return f"{credibility_page.source(one['experiment'])}: {_recalled(one['rests_on'])}"
+
+
+def _recalled(text: str) -> str:
+    """Where a number was read; the page explains the word recalled."""
+    return text.replace("from memory", "recalled").replace("memory", "recalled")
 
 
 def _where(one: dict[str, Any]) -> str:
@@ -166,9 +185,9 @@ def _credibility_sources() -> str:
         own = [one for one in found if one["experiment"] == name and one["kind"] == "measurement"]
         if own:
             met, n = f"{sum(one['met'] for one in own)} of {len(own)}", own[0]["n"] or "not known"
-            rests = " / ".join(dict.fromkeys(one["rests_on"] for one in own))
+            rests = " / ".join(dict.fromkeys(_recalled(one["rests_on"]) for one in own))
             rows.append((credibility_page.source(name), record.specimen, n, met, rests))
-    return table("credibility", ("source", "specimens", "n", "met", "source of its numbers"), rows)
+    return table("credibility", ("source", "specimens", "n", "reproduced", "source of its numbers"), rows)
 
 
 def _credibility_arms() -> str:

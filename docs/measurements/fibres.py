@@ -59,7 +59,7 @@ def _fibre_ends_rows() -> str:
     for one in kept("fibre_ends")["measured"]:
         facts, covered = one["facts"], ", ".join(f"{name} {value:.0f}" for name, value in one["covered"].items())
         words = facts.get("fibre_ends_not_attached", "") + facts.get("fibre_ends_continued_by", "")
-        named = [f"{end} of {fibre} {float(far):.0f} mm" for end, fibre, far in _FAR.findall(words)]
+        named = [f"{end} point of fibre {fibre}: {float(far):.0f} mm" for end, fibre, far in _FAR.findall(words)]
         far = ("by a tendon: " if "fibre_ends_continued_by" in facts else "") + (", ".join(named) or "none")
         off = [one["status"] if value is None else f"{value:.1f}" for value in one["off"].values()] or [one["status"]]
         rows.append((f"`{one['case']}`", covered, f"{facts['fibre_ends']:.0f}", far, ", ".join(off)))
@@ -110,7 +110,7 @@ def _fibre_choice_rows() -> str:
             (f"`{case}`" + f" ({ended})" * bool(ended), *(" / ".join(pair) for pair in zip(*cells, strict=True)))
         )
     head = ("case", "fibres: shipped / others", "mean length at rest, mm", "its change to 0.5 rad, mm")
-    return table("fibre_choice", (*head, "arm at rest, mm", "arm at 0.5 rad, mm"), rows)
+    return table("fibre_choice", (*head, "moment arm at rest, mm", "moment arm at 0.5 rad, mm"), rows)
 
 
 def _choice_cells(one: dict[str, Any]) -> Iterator[str]:

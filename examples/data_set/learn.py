@@ -10,7 +10,7 @@ from fits import kernel, network
 
 
 def blended(one: dict) -> np.ndarray:
-    """Each vertex goes with both bones, by its height: what is learned is the rest."""
+    """Linear blend skinning: each vertex moves with both bones, weighted by its height. What is learned is the rest."""
     at = np.c_[one["points"], np.ones(len(one["points"]))]
     upper, lower = (at @ one["poses"][:, i, :3].transpose(0, 2, 1) for i in (0, 1))
     return lower + at[:, 2:3] / at[:, 2].max() * (upper - lower)
@@ -49,8 +49,9 @@ def errors(folder: str) -> Iterator[dict]:
             for i, (one, rows) in enumerate(test):
                 found = learned(fit, [train[i]] if split == "pose" else train, one, rows) if fit else blended(one)[rows]
                 away.append(np.linalg.norm(found - one["positions"][rows], axis=2).mean())
-            row = {"split": split, "solver": fit.__name__ if fit else "bones blended", "learned": fit is not None}
-            yield row | {"error": np.mean(away), "muscles": len(test), "seconds": time.process_time() - begin}
+            name, seconds = fit.__name__ if fit else "linear blend skinning", time.process_time() - begin
+            row = {"split": split, "solver": name, "learned": fit is not None}
+            yield row | {"error": np.mean(away), "muscles": len(test), "seconds": seconds}
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ _ROUNDED = 0.5  # the rounding of a share published without decimals, in per cen
 _WHOLE = 100.0  # all poses, in per cent
 _READ = ("publication", "abstract", "quotation", "memory")  # the texts in which numbers were read, the best first
 # "outside": the model differs from some measurement by more than its uncertainty, even if it agrees with other measurements.
-Grade = Literal["validated", "indicative", "outside", "verified only", "not measured"]
+Grade = Literal["validated", "indicative", "outside", "verified only", "not compared"]
 
 
 class Evidence(Record):
@@ -126,7 +126,7 @@ class Row:
         """
         met, of = self.measured
         if of == 0:
-            return "not measured" if self.claim.arms or self.claim.experiments else "verified only"
+            return "not compared" if self.claim.arms or self.claim.experiments else "verified only"
         if met < of:
             return "outside"
         return "validated" if any(one.validates for one in self.beside) else "indicative"

@@ -7,9 +7,9 @@ from fem_reference.foundations.units import PositiveLength, Stiffness
 
 
 class Tendon(Interaction):
-    """Tension ``k (l - l0)`` along straight lines that are longer than at rest; slack lines do not push. The lines run from the
-    surface within ``reach`` of the ends of fibres that continue as the ``tendon`` of an attachment, to the point of this tendon on
-    the bone.
+    """Tension ``k (l - l0)`` along straight lines that are longer than at rest; slack lines do not push. The lines start on the
+    surface, within ``reach`` of the ends of the fibres that continue into the ``tendon`` of an attachment. They end at the point of
+    this tendon on the bone.
 
     ``on``: the attachment; ``stiffness`` [N/mm]: the stiffness of all lines together, divided among them by area into shares k: ``E
     A / l0`` for a tendon of modulus E and cross-section A; ``reach`` [mm]. A tendon is slack at rest and not allowed with

@@ -23,7 +23,7 @@ GRADES = {
     "outside": "the model differs from a measurement of muscle by more than its uncertainty, or a measured moment arm is not "
     "within the range of the fibres in all poses",
     "verified only": "the equations are solved correctly; no measurement of muscle is compared with it",
-    "not measured": "the data of its experiment are not installed",
+    "not compared": "the data of its experiment are not installed",
 }
 
 

@@ -143,7 +143,7 @@ class CaseBone(Record):
 
 
 class CaseJoint(Record):
-    """A joint: the right-handed ``axis`` through a ``centre`` about which a ``bone`` turns; its angle is 0 at the first frame."""
+    """A joint: the right-handed ``axis`` through a ``centre`` about which a ``bone`` rotates; its angle is 0 at the first frame."""
 
     name: Name
     bone: str

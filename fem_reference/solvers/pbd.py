@@ -30,7 +30,7 @@ _AS_NEAR = 1e-9
 
 class PbdCollision(Record):
     """Contact of bones with free vertices. ``gap`` [mm]: the least distance of a vertex, or its distance at rest if that is less;
-    ``stiffness``: the share of the displacement out of a bone that one projection applies.
+    ``stiffness``: the fraction of the displacement out of a bone that one projection applies.
     """
 
     gap: Annotated[Length, Field(ge=0)]
@@ -41,9 +41,9 @@ class PbdSettings(Record):
     """Settings of the algorithm; every key is required except the keys that add an effect.
 
     ``sub_iterations``: steps of the algorithm in each iteration, 3 in section 6.1 of the report. ``solver_iterations``: sweeps over
-    all constraints in each step (line 15). ``damping``: the share of every velocity that is lost in a step (line 8). ``stretch``,
-    ``volume``, ``bending``: the stiffness of edge lengths, enclosed volume and dihedral angles, which is the share of an error that
-    one projection removes, from 0 (constraint off) to 1.
+    all constraints in each step (line 15). ``damping``: the fraction of each velocity lost in a step (line 8). ``stretch``,
+    ``volume``, ``bending``: the stiffness of edge lengths, enclosed volume and dihedral angles, that is, the fraction of an
+    error that one projection removes, from 0 (constraint off) to 1.
 
     ``anisotropy`` a: edges have the stiffness ``stretch (1 - a |cos|)``, with the angle to the nearest fibre at rest; a = 1 in the
     report's program with fibres. ``collision``: contact with bones (lines 12 to 14).

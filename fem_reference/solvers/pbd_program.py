@@ -59,8 +59,8 @@ DIGITS = 12
 class ProgramSettings(Record):
     """Settings of the program; every key is required except the keys that add an effect.
 
-    ``sub_iterations``: steps in each iteration, 3 in section 6.1 of the report. ``damping``: the share of every velocity that is
-    lost in a step, 0.01 in the program. ``bending``: a factor on the correction of a dihedral angle, 0.9 in the program.
+    ``sub_iterations``: steps in each iteration, 3 in section 6.1 of the report. ``damping``: the fraction of every velocity that
+    is lost in a step, 0.01 in the program. ``bending``: a factor on the correction of a dihedral angle, 0.9 in the program.
     ``voxels``: their number along each side of a bone's bounding box, 64 in the program; without this key there is no contact.
     ``anisotropy`` a: the stiffness of an edge is (1 - |cos|)^a, with its angle to the nearest fibre, and a = 1 in the program;
     without this key the stiffness is 1, as in the program without fibres.

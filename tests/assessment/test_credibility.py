@@ -77,7 +77,7 @@ def test_a_grade_is_as_good_as_the_comparisons() -> None:
     )
     assert graded().grade == "verified only"
     asked = replace(graded(), claim=CLAIM.model_copy(update={"arms": True}))
-    assert asked.grade == "not measured", "without the data a quantity is no better than with it"
+    assert asked.grade == "not compared", "without the data a quantity is no better than with it"
     assert graded(within).grade == "validated"
     assert graded(quoted).grade == "indicative"
     assert graded(quoted, within).grade == "validated"
@@ -139,7 +139,7 @@ def test_other_models_are_counted_apart_and_decide_no_grade() -> None:
     assert (one.measured, one.models, one.grade) == ((1, 1), (1, 2), "indicative")
     assert graded(beyond, near).grade == "outside"
     assert graded(near).grade == "verified only"
-    assert replace(graded(far), claim=CLAIM.model_copy(update={"arms": True})).grade == "not measured"
+    assert replace(graded(far), claim=CLAIM.model_copy(update={"arms": True})).grade == "not compared"
     assert len(one.misses) == 1, "the bias is that from measurements"
 
 
@@ -227,9 +227,11 @@ def test_stated_bars_are_those_of_the_page_of_error_bars() -> None:
     stated = {one.name: one.bar for one in claims()}
     columns = {"Volume": "volume", "Fibre length": "fibre length, rms", "Surface": "surface, rms"}
     for name, column in columns.items():
-        bars = sorted((row[head.index(column)].removeprefix("± ").split()[0] for row in cases), key=float)
+        bars = sorted(
+            (row[head.index(f"error bar of {column}")].removeprefix("± ").split()[0] for row in cases), key=float
+        )
         assert stated[name].startswith(f"{bars[0]} to {bars[-1]} "), name
-    bar, value, where = re.fullmatch(r"(\S+) of (\S+) kPa in the mean \((\w+)\)", stated["Stress"]).groups()
+    bar, value, where = re.fullmatch(r"± (\S+) kPa on a mean of (\S+) kPa \((\w+)\)", stated["Stress"]).groups()
     (said,) = [one for one in text.split("\n\n") if "mean stress along the fibres" in one]
     assert f"the mean stress along the fibres is {value} ± {bar} kPa" in " ".join(said.split())
     assert f"`{where}`" in said

@@ -36,5 +36,5 @@ def test_without_the_anatomy_moment_arms_are_not_measured(
     monkeypatch.setattr(cube_fits, "collagen_law", partial(cube_fits.collagen_law, 1))  # the fit has its own test
     assert cli.main(["page", "credibility", "--out", str(tmp_path), "--quiet"]) == 0
     printed = capsys.readouterr().out
-    assert "1 not measured" in printed
+    assert "1 not compared" in printed
     assert "left out: iliacus_anatomical" in printed

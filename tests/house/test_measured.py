@@ -22,9 +22,9 @@ def test_every_table_has_its_place() -> None:
     assert set(places) == set(measured.WRITTEN)
 
 
-def test_the_three_bars_side_by_side_are_those_of_their_sources() -> None:
+def test_the_error_bar_and_the_bands_side_by_side_are_those_of_their_sources() -> None:
     """Numerical bars and model bands of the evidence by quantity, and the greatest widths of the bands of two cases, rounded."""
-    text = pages.page("docs/validation.md").partition("## Three bars\n")[2]
+    text = pages.page("docs/validation.md").partition("## One error bar and two bands\n")[2]
     numerical, parameters, models = (
         next(line for line in text.splitlines() if line.startswith(f"| **{name}"))
         for name in ("numer", "param", "model")

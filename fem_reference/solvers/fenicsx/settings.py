@@ -22,8 +22,8 @@ class BodySettings(Record):
     ``out of steps``, it is continued with exact solutions); ``"multigrid"``, FGMRES with two levels of elements; the default
     depends on the size. ``precision`` of factorisations: by default double if direct and single if lagged. Both settings change the
     time but not the result. ``follow``: ``"equilibrium"``, any that Newton's method finds, or ``"stable"``: if the equilibrium of a
-    frame is unstable (and negative modes are counted), the body is moved along its lowest mode by a ``perturbation``, a share of
-    its size, and solved again; the perturbation is reversed and enlarged, up to eight times, until there are fewer negative modes.
+    frame is unstable (and negative modes are counted), the body is moved along its lowest mode by a ``perturbation``, a fraction of
+    its size, and the frame is solved again; the move is reversed and enlarged, up to eight times, until fewer modes are negative.
     ``reuse``: reuse the state of an earlier frame with the same load. ``time_limit``: the limit on processor time for each rank, by
     default none; if the wall-clock time exceeds twenty times this limit, the status is *stalled*, which allows no conclusion.
     ``store_state``: each frame also stores the unknowns of every cell, from which ``results`` evaluates stress, pressure, det F and
