@@ -9,7 +9,7 @@ from fem_reference.foundations.units import VolumeDamping
 
 
 class Damping(Energy):
-    """A force per rest volume of ``-coefficient v``, with v the velocity relative to the ground.
+    """A force per unit rest volume of ``-coefficient v``, with v the velocity relative to the ground.
 
     Over a load step v is ``rate (u - before)`` (implicit Euler), and the force is minus the derivative of
     ``coefficient / 2 rate |u - before|^2``: a potential of the step, not a stored energy.
@@ -37,6 +37,6 @@ class Damping(Energy):
         return None if found is None else Wrench(*(-self.coefficient * one for one in found))
 
     def energy(self, state: State) -> Any:
-        """The potential of the step per rest volume [MPa]."""
+        """The potential of the step per unit rest volume [MPa]."""
         square = sum((now - before) ** 2 for now, before in zip(state.displacement, state.before, strict=True))
         return self.coefficient / 2 * state.rate * square

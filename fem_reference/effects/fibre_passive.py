@@ -54,7 +54,7 @@ class FibrePassive(PassiveFibres):
         return Moduli(fibres=self.stress)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa], zero in slack fibres."""
+        """Energy per unit rest volume [MPa], zero in slack fibres."""
         p1, p2, exp = self.p1, self.p2, state.functions.exp
         stretch = state.fibre_stretch / self.optimal_stretch
         toe = state.between(1, self.linear_from, stretch) - 1

@@ -32,6 +32,6 @@ class Gravity(Ramped, Energy):
         return dead(self.density * np.array(self.acceleration), shape)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa], zero at rest."""
+        """Energy per unit rest volume [MPa], zero at rest."""
         work = sum(g * u for g, u in zip(self.acceleration, state.displacement, strict=True))
         return -state.amount * self.density * work

@@ -11,7 +11,7 @@ from fem_reference.foundations.units import Density
 
 
 class Inertia(Energy):
-    """A force per rest volume of ``-density a``, with a the acceleration, integrated by an implicit method of second order.
+    """A force per unit rest volume of ``-density a``, with a the acceleration, integrated by an implicit method of second order.
 
     The method is the member of the generalised-alpha family with stresses taken at the end of a step (Wood, Bossak and Zienkiewicz
     1980, doi 10.1002/nme.1620151011; Chung and Hulbert 1993, doi 10.1115/1.2900803, with alpha_f = 0): ``alpha = (r - 1) / (r +
@@ -42,12 +42,12 @@ class Inertia(Energy):
         return Indicator("Cauchy number, density times speed squared over shear modulus", cauchy, lag, stress)
 
     def energy(self, state: State) -> Any:
-        """The potential of the step per rest volume [MPa]."""
+        """The potential of the step per unit rest volume [MPa]."""
         square = sum((now - then) ** 2 for now, then in zip(state.displacement, state.predicted, strict=True))
         return self.density * (1 + self.spectral_radius) * state.rate**2 * square
 
     def kinetic(self, velocity: Any) -> Any:
-        """The kinetic energy per rest volume [MPa] at a ``velocity`` (3,) [mm/s]."""
+        """The kinetic energy per unit rest volume [MPa] at a ``velocity`` (3,) [mm/s]."""
         return self.density / 2 * sum(component**2 for component in velocity)
 
     def predicted(self, u: Any, v: Any, a: Any, seconds: float) -> Any:

@@ -14,9 +14,9 @@ from fem_reference.foundations.units import PressureVector
 
 
 class Traction(Ramped, Load):
-    """``amount t``: a force per area at rest, whose direction and size do not depend on the deformation.
+    """``amount t``: a force per unit rest area, whose direction and size do not depend on the deformation.
 
-    ``on``: the part of the surface; ``force``: t, the force per area at rest (3,) [MPa].
+    ``on``: the part of the surface; ``force``: t, the force per unit rest area (3,) [MPa].
     """
 
     example: ClassVar[dict[str, Any]] = {"force": "0, 6.25, 1 kPa"}

@@ -3,8 +3,8 @@ moment is positive if it turns the bone to greater angles; its moment arm is the
 By virtual work, without dissipation, the moment is minus the derivative of the stored energy with respect to the angle. Lines of
 action pull at their ends, via-points and obstacles. The force is not known for lines without ``hill`` and for most fast solvers.
 
-The arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with little
-force (docs/measures.md).
+The moment arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with
+little force (docs/measures.md).
 """
 
 from functools import partial
@@ -35,7 +35,7 @@ STATISTICS = {
     ),
 }
 OF, AGAINST = "lines", "reference"
-_LEAST = 1e-6  # a force below this share of the greatest force is round-off and has no arm
+_LEAST = 1e-6  # a force below this share of the greatest force is round-off and has no moment arm
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
@@ -56,7 +56,7 @@ def _has_force(run: Run, joint: Joint) -> bool:
 
 
 def _values(run: Run, joint: Joint) -> Floats:
-    """Moment, force and arm by frame (3, f).
+    """Moment, force and moment arm by frame (3, f).
 
     For a muscle that is a line between two bones, or around obstacles on these bones, the arm is ``-dl/dtheta``. For any other
     muscle it is, by virtual work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
