@@ -203,9 +203,9 @@ class Verification:
 
     @property
     def beside(self) -> str:
-        """The number of experiments, and the number met within their uncertainty, in words; empty without experiments."""
+        """The number of experiments, and the number that agree within their uncertainty, in words; empty without experiments."""
         words = [one.word for one in self.results if one.entry.kind == "experiment"]
-        return f"{words.count('within')} of {len(words)} experiments met within their uncertainty" if words else ""
+        return f"{words.count('within')} of {len(words)} experiments agree within their uncertainty" if words else ""
 
     @property
     def word(self) -> str:

@@ -105,7 +105,7 @@ class Pair:
     """Runs of the reference over the same frames: ``fine`` is the reference itself, ``coarse`` has larger tetrahedra, each of
     ``varied`` is ``coarse`` with one source of error halved, by name, and ``exact`` has exact attachments instead of springs.
 
-    ``sizes`` [mm]: the sizes of the tetrahedra; ``safety``: the factor of bars over the expected error; ``springs``: True if some
+    ``sizes`` [mm]: the sizes of the tetrahedra; ``safety``: the ratio of bars to the expected error; ``springs``: True if some
     attachment is by springs.
     """
 
@@ -118,7 +118,7 @@ class Pair:
     springs: bool = False
 
     def share(self, metric: str, statistic: str) -> float:
-        """The error of the fine run over the difference of the two runs, with the safety factor of a grid convergence index."""
+        """The ratio of the fine run's error to the difference of the two, with the safety factor of a grid convergence index."""
         stated = described()[metric, statistic]
         order = ORDER_OF_WORST if stated.local else ORDER
         safety = self.safety * (LONE_FIBRE if stated.lone else 1.0)

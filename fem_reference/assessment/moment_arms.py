@@ -17,7 +17,7 @@ DEGREE, STEP = 4, 2.0
 
 @dataclass(frozen=True, eq=False)
 class ArmRange:
-    """The least and greatest arm ``low``, ``high`` (a,) [mm] of a muscle's fibres at ``angles`` (a,) [deg]."""
+    """The least and greatest moment arm ``low``, ``high`` (a,) [mm] of a muscle's fibres at ``angles`` (a,) [deg]."""
 
     angles: Floats
     low: Floats
@@ -37,7 +37,7 @@ def poses(angles: Floats) -> Floats:
 
 
 def fitted_arms(angles: Floats, lengths: Floats, at: Floats) -> Floats:
-    """``-dl/dangle`` (a, k) [mm] at angles ``at`` (a,) [deg], of the polynomial of fourth degree that fits the ``lengths`` (f, k)
+    """``-dl/dangle`` (a, k) [mm] at angles ``at`` (a,) [deg], of the quartic polynomial that fits the ``lengths`` (f, k)
     [mm] of k fibres at ``angles`` (f,) [deg] best. InputError if too few angles differ.
     """
     if len(np.unique(np.round(angles, 9))) <= DEGREE:
@@ -74,9 +74,9 @@ def overlap(found: ArmRange, published: ArmRange) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ArmsBeside:
-    """Arms of a muscle's fibres in a run of ``case`` compared with a published curve or range of an ``experiment``: at ``angles``
-    (a,) [deg] the range ``found`` and the mean ``middle`` (a,) [mm] of the fibres, and the ``published`` range, whose ends are
-    equal for a curve.
+    """Moment arms of a muscle's fibres in a run of ``case`` compared with a published curve or range of an ``experiment``: at
+    ``angles`` (a,) [deg] the range ``found`` and the mean ``middle`` (a,) [mm] of the fibres, and the ``published`` range, whose
+    ends are equal for a curve.
 
     ``kind``: the kind of the experiment; ``sense``: the direction of rotation for positive moment arms; ``setting``: the resolution
     of the run; ``coarser``: the greatest change of the mean moment arm over the poses [mm] on larger tetrahedra.

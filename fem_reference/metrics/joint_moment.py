@@ -1,7 +1,7 @@
 """Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis. A
-moment is positive if it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in space.
-By virtual work, without dissipation, the moment is minus the derivative of the stored energy with respect to the angle. Lines of
-action pull at their ends, via-points and obstacles. The force is not known for lines without ``hill`` and for most fast solvers.
+moment is positive if it turns the bone to greater angles; its moment arm is the moment divided by the force. The axis is fixed in
+space. By virtual work, without dissipation, the moment is minus the derivative of the stored energy with respect to the angle.
+Lines of action pull at ends, via-points and obstacles. The force is unknown for lines without ``hill`` and most fast solvers.
 
 The moment arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with
 little force (docs/measures.md).
@@ -31,7 +31,7 @@ STATISTICS = {
         "N", "Joint", "force", curve="Force of the muscle on the bone of the joint", shown={"curve": 27, "angle": 27}
     ),
     "arm": _of_one(
-        "mm", "Joint", "arm by force", curve="Moment arm by force: moment over force", shown={"curve": 28, "angle": 28}
+        "mm", "Joint", "moment arm by force", curve="Moment arm: moment / force", shown={"curve": 28, "angle": 28}
     ),
 }
 OF, AGAINST = "lines", "reference"
