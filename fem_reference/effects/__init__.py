@@ -228,7 +228,7 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
 
 def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:
     """The indicator of fibres whose tension ``pull`` [MPa] moves the surface of the muscle by a ``distance`` [mm]."""
-    return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, distance, pull)
+    return Indicator("ratio of fibre tension to shear modulus", pull / scene.shear, distance, pull)
 
 
 class FieldEffect(Record):

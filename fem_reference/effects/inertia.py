@@ -31,7 +31,7 @@ class Inertia(Energy):
     spectral_radius: float = Field(default=0.9, ge=0, le=1)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The lag of a beam under its inertial force, and the stress of the wave that a jump of velocity sends through the
+        """The lag of a beam under its inertial force, and the stress of the wave that a jump in velocity sends through the
         beam. The first frequency of the beam follows from its deflection under its own weight.
         """
         square = scene.bend(self.density)  # the inverse square of the frequency
@@ -39,7 +39,7 @@ class Inertia(Energy):
         lag = scene.lag(max(square * acceleration, math.sqrt(square) * jump))
         stress = max(self.density * acceleration * scene.length, math.sqrt(self.density * scene.shear) * jump)
         cauchy = self.density * scene.in_time(scene.speed) ** 2 / scene.shear
-        return Indicator("Cauchy number, density times speed squared over shear modulus", cauchy, lag, stress)
+        return Indicator("Cauchy number, density times speed squared divided by shear modulus", cauchy, lag, stress)
 
     def energy(self, state: State) -> Any:
         """The potential of the step per unit rest volume [MPa]."""

@@ -26,7 +26,7 @@ class Traction(Ramped, Load):
         """The distance by which the load extends the muscle."""
         load = scene.greatest(self) * math.hypot(*self.force)
         part = load / scene.shear
-        return Indicator("traction over the shear modulus", part, part * scene.length / 3, load)
+        return Indicator("ratio of traction to shear modulus", part, part * scene.length / 3, load)
 
     def resultant(self, shape: Shape) -> Wrench:
         """The load on the entire part."""

@@ -100,8 +100,8 @@ class Results:
         return {name: np.concatenate([part[name] for part in parts]) for name in wanted}
 
     def energies(self, frame: float) -> dict[str, float]:
-        """The energy [N mm] of each effect that has one, by its name in scene files, at one of the frame numbers ``frames``. An
-        effect's share of a moment is minus the slope of its energy in the angle. Contact and springs are left out.
+        """The energy W [N mm] of each effect that has one, by its name in scene files, at one of the frame numbers ``frames``. An
+        effect's share of a moment is -dW/dtheta, theta the angle of the joint. Contact and springs are left out.
         """
         state, (rule, shares), found = self._state(frame), _rule(), dict[str, float]()
         acting = [(effect, effect.amount(frame)) for effect in self.effects]
