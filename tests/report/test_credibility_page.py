@@ -100,7 +100,7 @@ def test_the_row_of_arms_has_the_range_of_biases_and_each_case_stands_below_once
     page = credibility_page.page(replace(found(), arms=several))
     text = html.unescape(report.write(page, tmp_path / "new", "credibility").read_text()).replace("\u202f", " ")
     assert "2 of 3 measurements within their uncertainty; 1 too small, by 13 mm; 0 of 1 other models" in text
-    assert text.count("bias 0.0 mm, scatter 0.0 mm over the 10 of 10 poses") == 1
+    assert text.count("bias 0.0 mm, scatter 0.0 mm over 10 of 10 poses") == 1
 
 
 def test_a_fit_is_met_by_the_same_uncertainty_and_unknown_without_a_value() -> None:

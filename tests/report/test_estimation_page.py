@@ -39,7 +39,7 @@ def test_what_was_not_measured_is_not_said(lacking, tmp_path) -> None:
     """Of fibres of few points there are no curves, and none that deviates least."""
     some = replace(found(), **dict.fromkeys(lacking, ()))
     assert ("deviates least" in estimation_page.said(some)) is ("curves" not in lacking)
-    assert ("Gaussians miss" in estimation_page.said(some)) is ("fits" not in lacking)
+    assert ("Gaussians deviate" in estimation_page.said(some)) is ("fits" not in lacking)
     assert estimation_page.said(some)
     text = report.write(estimation_page.page(some), tmp_path / "new", "estimation").read_text()
     assert text.count("<svg") == 4 - len({"curves", "fits"} & {*lacking})
