@@ -77,8 +77,8 @@ class Entry:
 
     An entry of the kind "experiment" compares a model with a muscle: its verdict is "within" or "outside" the uncertainty of the
     experiment, and neither is a failure. It fails if the value no longer equals ``pinned``. ``facts``: the measured numbers from
-    which its truth is computed; ``is_order``: True for an order of stiffness, whose value is 1 if it is met and 0 if not, within
-    0.5; ``from_memory``: True if a part of its model or of its source is from memory.
+    which its truth is computed; ``is_order``: True for a stiffness ranking, whose value is 1 if reproduced, else 0, within
+    0.5; ``from_memory``: True if a part of its model or of its source is recalled, not checked against the publication.
     """
 
     name: str
@@ -165,7 +165,7 @@ def result(entry: Entry, finding: Finding, seconds: float, *, with_negative_cont
 
 
 def order(ladder: tuple[tuple[float, float], ...], truth: float) -> float | None:
-    """The order of the error over the last two meshes of a ``ladder`` of (size, value), None if one of them is exact.
+    """The order of the error over the last two meshes of a ``ladder`` of (size, value), None if either is exact.
 
     >>> round(order(((2.0, 1.04), (1.0, 1.01)), 1.0), 6)
     2.0
@@ -203,9 +203,9 @@ class Verification:
 
     @property
     def beside(self) -> str:
-        """The number of experiments, and the number met within their uncertainty, in words; empty without experiments."""
+        """The number of experiments, and the number that agree within their uncertainty, in words; empty without experiments."""
         words = [one.word for one in self.results if one.entry.kind == "experiment"]
-        return f"{words.count('within')} of {len(words)} experiments met within their uncertainty" if words else ""
+        return f"{words.count('within')} of {len(words)} experiments agree within their uncertainty" if words else ""
 
     @property
     def word(self) -> str:

@@ -56,7 +56,7 @@ class Beside:
     """A value of the model compared with a known value, both in ``unit``. ``truth``: the known value; ``within``: its uncertainty;
     ``n``: the number of specimens, None if unknown. ``validates``: True if agreement counts as validation. ``rests_on``: the text
     in which the truth was read, and the unmeasured parts of truth or model. ``kind``: measurement, or model if another model is the
-    truth. ``is_order``: True for an order of stiffness, whose value is 1 if it is met and 0 if not, within 0.5.
+    truth. ``is_order``: True for a stiffness ranking, whose value is 1 if reproduced, else 0, within 0.5.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Beside:
 
 
 def count(several: Iterable[Beside], kind: Kind) -> tuple[int, int]:
-    """The number of comparisons of a ``kind`` that are met, and the number of all comparisons of this kind."""
+    """The number of comparisons of a ``kind`` that agree, and the number of all comparisons of this kind."""
     met = [one.met for one in several if one.kind == kind]
     return sum(met), len(met)
 
@@ -105,7 +105,7 @@ class Row:
 
     @property
     def misses(self) -> tuple[float, ...]:
-        """The deviations from measured numbers, orders left out, over their uncertainties."""
+        """The deviations from measured numbers (no rankings) divided by their uncertainties."""
         measured = [one for one in self.beside if one.kind == "measurement" and not one.is_order]
         return tuple((one.value - one.truth) / one.within for one in measured)
 
@@ -121,8 +121,8 @@ class Row:
 
     @property
     def grade(self) -> Grade:
-        """The grade: "outside" if one measurement is not met, else "validated" if some measurement counts as validation, else
-        "indicative"; "verified only" without a known experiment, "not measured" without its results. Other models do not count.
+        """The grade: "outside" if it disagrees with one measurement, else "validated" if some measurement counts as validation,
+        else "indicative"; "verified only" without a known experiment, "not measured" without its results. Models do not count.
         """
         met, of = self.measured
         if of == 0:
@@ -154,7 +154,7 @@ def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result]
 
 
 def of_result(found: Result) -> Beside:
-    """A measured entry of the kind experiment; it validates only if all its facts do and its model is not from memory."""
+    """A measured entry of the kind experiment; it validates only if all its facts do and its model is not recalled."""
     entry = found.entry
     facts = entry.facts
     counted = not entry.from_memory and bool(facts) and all(one.validates for one in facts)
@@ -171,19 +171,20 @@ def of_result(found: Result) -> Beside:
 
 
 def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> str:
-    """The least reliable text in which ``facts`` were read, and notes on a tolerance chosen here and a model from memory."""
+    """The least reliable text in which ``facts`` were read, and notes on a tolerance chosen here and a recalled model."""
     read = max((one.read_in for one in facts), key=_READ.index, default="not known")
     chosen = not is_order and not (facts and all(one.sd for one in facts))
     remembered = from_memory and all(one.doi_confirmed == "yes" for one in facts)
-    return f"{read}{'; ± chosen by us' if chosen else ''}{'; a part of the model from memory' if remembered else ''}"
+    return f"{read}{'; ± chosen by us' if chosen else ''}{'; part of the model recalled' if remembered else ''}"
 
 
 def of_arms(arms: ArmsBeside) -> Beside:
     """Moment arms compared with a measured curve, which should be within their range in all poses, or with the range of another
-    model, of which the arms should cover the same share [%] as the arms of Modenese and Kohout 2020.
+    model, of which they should cover the same share [%] as the moment arms of Modenese and Kohout 2020.
     """
     others_reach = reached(arms)
-    words = "poses with the measured arm inside the fibres' range" if arms.is_curve else "overlap with a model's range"
+    inside = "poses with the measured moment arm inside the fibres' range"
+    words = inside if arms.is_curve else "overlap with a model's range"
     title = f"{arms.muscle.replace('_', ' ').capitalize()}, {arms.sense}: {words} ({arms.case} and {arms.experiment})"
     share, truth = 100 * arms.share, _WHOLE if arms.kind == "measurement" else others_reach
     others = f"; fibres of another model of this body reach {others_reach:g} %" if arms.kind == "measurement" else ""
@@ -192,8 +193,8 @@ def of_arms(arms: ArmsBeside) -> Beside:
         *(share >= truth - _ROUNDED, False),
         experiment=arms.experiment,
         rests_on="quotation, digitised; no ± known",
-        remark=f"bias {arms.bias:.1f} mm, scatter {arms.scatter:.1f} mm over the {arms.known} of {len(arms.found.angles)} poses in "
-        f"which the published arm is known; {arms.setting}; with larger ones the mean arm changes by {arms.coarser:.1f} mm{others}",
+        remark=f"bias {arms.bias:.1f} mm, scatter {arms.scatter:.1f} mm over {arms.known} of {len(arms.found.angles)} poses with "
+        f"a published moment arm; {arms.setting}; on larger ones the mean changes by {arms.coarser:.1f} mm{others}",
         kind=arms.kind,
     )
 

@@ -32,8 +32,8 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
     the distance times the average ratio of difference to distance over the frames. A difference that crosses zero does not
     show that the error is small in that frame. If the surfaces are equal, the size is 0.
 
-    If the motion ``moved`` (f,) [mm] of the surfaces is given, the distance counts as at least the motion times the median ratio
-    of distance to motion: in some poses two meshes agree better by chance.
+    If the motion ``moved`` (f,) [mm] of the surfaces is given, the distance is taken to be at least the motion times the median
+    ratio of distance to motion: in some poses two meshes agree better by chance.
     """
     size = apart
     if moved is not None:
@@ -43,7 +43,7 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
 
 
 def together(parts: dict[str, Floats], there: NDArray[np.bool_]) -> tuple[Floats, dict[str, float]]:
-    """The bar (f,) of independent causes from its ``parts`` (f,) by cause, and the greatest value of each part over the frames
+    """The bar (f,) of independent sources from its ``parts`` (f,) by source, and the greatest value of each part over the frames
     ``there`` (f,), or over all frames if this is empty.
     """
     greatest = {name: float((part[there] if there.any() else part).max()) for name, part in parts.items()}
@@ -57,8 +57,8 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
 
     By the triangle inequality, changes of the same places differ by at most their deviation. They differ by less, as most of the
     deviation is not along the displacement, or cancels. A single statistic does not show by how much less: its difference may be
-    small by chance, especially at the worst place. A quantile or a greatest value belongs to one place, wherever it is: nothing
-    cancels there, and no quantile of the deviation bounds it. So its difference counts as at least the rms distance over places.
+    small by chance, especially at the worst point. A quantile or a greatest value belongs to one place, wherever it is: nothing
+    cancels there, and no quantile of the deviation bounds it. So its difference is at least the rms distance over places.
     """
     metrics = [metric for metric, _ in names]
     shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]
@@ -82,7 +82,7 @@ def carried(run: Run, moved: Floats) -> dict[str, Floats]:
     """Errors (f,) of the volume that the surface of a ``run`` encloses, by statistic. Its tetrahedra carry the surface, which lies
     partly outside them: the error is the difference of the changes of both volumes. Empty for a run without tetrahedra.
 
-    The error may cross zero: it counts as at least its average share of the surface's motion ``moved`` (f,) [mm].
+    The error may cross zero: it is taken to be at least its average share of the surface's motion ``moved`` (f,) [mm].
     """
     inside = run.scalars.get("volume_ratio")
     if inside is None:

@@ -32,10 +32,10 @@ SAFETY = 1.25
 # An additional factor for a single fibre: nothing averages out, and two sizes are weaker evidence than three (for two sizes Roache
 # takes 3). It was chosen so that bars cover the differences from finer solutions (docs/error_bars.md).
 LONE_FIBRE = 1.2
-# The remaining error, of first order, over the change of the result when its cause is halved. For the cells of a body this is the
-# least order away from rims of constraints, for any element (docs/error_bars.md).
+# The ratio of the remaining first-order error to the change of the result when its source is halved. For the cells of a body this
+# is the least order away from rims of constraints, for any element (docs/error_bars.md).
 VARIATION = 2.0
-# The order of an error in the size of tetrahedra: in general, and at the worst place. Rims of attachments, where displacement grows
+# The order of an error in the size of tetrahedra: in general, and at the worst point. Rims of attachments, where displacement grows
 # with the square root of the distance, give order 1, or 2 with a mesh graded towards them; all other places give 2 or more. The
 # general order is in between, as runs with three sizes also show (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
@@ -55,7 +55,7 @@ _Differences = dict[Of, list[Floats]]
 @dataclass(frozen=True, eq=False)
 class ErrorBar:
     """The error bar of one statistic: its possible error due to the reference, ``values`` (f,) in ``unit``, NaN if unknown. ``of``:
-    the reference's change from rest, or a candidate's deviation from the reference. ``parts``: by cause, its greatest contribution
+    the reference's change from rest, or a candidate's deviation from the reference. ``parts``: by source, its greatest contribution
     over the frames.
 
     ``model`` (f,): the change of the statistic by another model of spring attachments: by exact attachments if these were solved,
@@ -103,9 +103,9 @@ class ErrorBars:
 @dataclass(frozen=True, eq=False)
 class Pair:
     """Runs of the reference over the same frames: ``fine`` is the reference itself, ``coarse`` has larger tetrahedra, each of
-    ``varied`` is ``coarse`` with one cause of error halved, by name, and ``exact`` has exact attachments instead of springs.
+    ``varied`` is ``coarse`` with one source of error halved, by name, and ``exact`` has exact attachments instead of springs.
 
-    ``sizes`` [mm]: the sizes of the tetrahedra; ``safety``: the factor of bars over the expected error; ``springs``: True if some
+    ``sizes`` [mm]: the sizes of the tetrahedra; ``safety``: the ratio of bars to the expected error; ``springs``: True if some
     attachment is by springs.
     """
 
@@ -118,7 +118,7 @@ class Pair:
     springs: bool = False
 
     def share(self, metric: str, statistic: str) -> float:
-        """The error of the fine run over the difference of the two runs, with the safety factor of a grid convergence index."""
+        """The ratio of the fine run's error to the difference of the two, with the safety factor of a grid convergence index."""
         stated = described()[metric, statistic]
         order = ORDER_OF_WORST if stated.local else ORDER
         safety = self.safety * (LONE_FIBRE if stated.lone else 1.0)
@@ -245,7 +245,7 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
 class BodyBars:
     """Error bars of a body at ``frames`` (f,): distances from its states on ever finer cells of the same shape. ``points`` (f, n)
     [mm], ``energy`` (f,) [N mm], and by name of each constraint or bone the vectors ``forces`` (f,) [N] and ``moments`` (f,)
-    [N mm]; NaN if unknown. ``displacement`` (f,): the bar of the displacement over the displacement, both rms over the nodes.
+    [N mm]; NaN if unknown. ``displacement`` (f,): the bar of the displacement divided by the displacement, both rms over the nodes.
     ``sharper``: the more accurate solution, in words.
     """
 

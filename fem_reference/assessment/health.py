@@ -1,4 +1,4 @@
-"""Quantities that show whether a run is stable, by frame and with the worst place: 0 for a healthy run."""
+"""Quantities that show whether a run is stable, by frame and with the worst point: 0 for a healthy run."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -71,7 +71,7 @@ class Followed:
 
 _LOOKS = 33  # the number of positions of a vertex that are sampled on its path from a frame to the next
 
-# Values (f,), and words (f,) and points (f, 3) of the worst place, the last two None if there is no particular place.
+# Values (f,), and words (f,) and points (f, 3) of the worst point, the last two None if there is no particular place.
 Found = tuple[Floats, list[str] | None, Floats | None]
 
 

@@ -1,5 +1,5 @@
-"""Moment arms of fibres compared with published arms: a polynomial fit of length over angle, the share of poses whose arm is within
-the fibres' range, and the overlap of two ranges.
+"""Moment arms of fibres compared with published arms: a polynomial fit of length against angle, the share of poses whose arm is
+within the fibres' range, and the overlap of two ranges.
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ DEGREE, STEP = 4, 2.0
 
 @dataclass(frozen=True, eq=False)
 class ArmRange:
-    """The least and greatest arm ``low``, ``high`` (a,) [mm] of a muscle's fibres at ``angles`` (a,) [deg]."""
+    """The least and greatest moment arm ``low``, ``high`` (a,) [mm] of a muscle's fibres at ``angles`` (a,) [deg]."""
 
     angles: Floats
     low: Floats
@@ -37,7 +37,7 @@ def poses(angles: Floats) -> Floats:
 
 
 def fitted_arms(angles: Floats, lengths: Floats, at: Floats) -> Floats:
-    """``-dl/dangle`` (a, k) [mm] at angles ``at`` (a,) [deg], of the polynomial of fourth degree that fits the ``lengths`` (f, k)
+    """``-dl/dangle`` (a, k) [mm] at angles ``at`` (a,) [deg], of the quartic polynomial that fits the ``lengths`` (f, k)
     [mm] of k fibres at ``angles`` (f,) [deg] best. InputError if too few angles differ.
     """
     if len(np.unique(np.round(angles, 9))) <= DEGREE:
@@ -63,7 +63,7 @@ def share_inside(curve: Floats, found: ArmRange) -> float:
 
 
 def overlap(found: ArmRange, published: ArmRange) -> float:
-    """The mean over the poses of the part of the ``published`` range that ``found`` covers; NaN if no pose is known."""
+    """The mean over the poses of the part of the ``published`` range that the ``found`` range covers; NaN if no pose is known."""
     known = np.isfinite(published.low) & np.isfinite(published.high)
     if not known.any():
         return float("nan")
@@ -74,12 +74,12 @@ def overlap(found: ArmRange, published: ArmRange) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ArmsBeside:
-    """Arms of a muscle's fibres in a run of ``case`` compared with a published curve or range of an ``experiment``: at ``angles``
-    (a,) [deg] the range ``found`` and the mean ``middle`` (a,) [mm] of the fibres, and the ``published`` range, whose ends are
-    equal for a curve.
+    """Moment arms of a muscle's fibres in a run of ``case`` compared with a published curve or range of an ``experiment``: at
+    ``angles`` (a,) [deg] the range ``found`` and the mean ``middle`` (a,) [mm] of the fibres, and the ``published`` range, whose
+    ends are equal for a curve.
 
-    ``kind``: the kind of the experiment; ``sense``: the direction of rotation for positive arms; ``setting``: the resolution of the
-    run; ``coarser``: the greatest change of the mean arm over the poses [mm] on larger tetrahedra.
+    ``kind``: the kind of the experiment; ``sense``: the direction of rotation for positive moment arms; ``setting``: the resolution
+    of the run; ``coarser``: the greatest change of the mean moment arm over the poses [mm] on larger tetrahedra.
     """
 
     case: str
@@ -105,7 +105,7 @@ class ArmsBeside:
 
     @property
     def bias(self) -> float:
-        """The mean [mm] over known poses of the fibres' mean arm minus the published arm or middle of the range; NaN for none."""
+        """The mean [mm] over known poses of the fibres' mean moment arm minus the published one (middle of a range), or NaN."""
         return float(self._off.mean()) if self._off.size else float("nan")
 
     @property
@@ -115,7 +115,7 @@ class ArmsBeside:
 
     @property
     def known(self) -> int:
-        """The number of poses in which the published arm is known; share, bias and scatter are taken over these."""
+        """The number of poses in which the published moment arm is known; share, bias and scatter are taken over these."""
         return int(np.isfinite(self._centre).sum())
 
     def between(self, first: float, last: float) -> "ArmsBeside":

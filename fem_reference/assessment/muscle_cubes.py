@@ -24,7 +24,7 @@ SHIPPED: Material = (make("neo_hooke", mu=0.01), VOLUME, make("fibre_passive", *
 class Quantity:
     """A measured quantity of a cube: its ``truth`` in ``unit`` from ``facts`` of an ``experiment``, its uncertainty ``within`` and
     the reason for it (``because``); ``of``: its value for a material. ``limit``: the reason why the shipped law cannot reach the
-    truth. ``is_order``: True for an order of stiffness, whose value is 1 if it is met and 0 if not, within 0.5.
+    truth. ``is_order``: True for a stiffness ranking, whose value is 1 if reproduced, else 0, within 0.5.
     """
 
     name: str
@@ -64,7 +64,7 @@ def poisson(stretch: float, degrees: float, axis: int) -> Callable[[Material], f
 
 
 def stiffness_ratio(stretch: float) -> Callable[[Material], float]:
-    """The stress of a cube loaded along its fibres over the stress of a cube loaded across them."""
+    """The ratio of the stress of a cube loaded along its fibres to that of a cube loaded across them."""
     return lambda material: stress(material, stretch, 0) / stress(material, stretch, 90)
 
 
@@ -77,7 +77,7 @@ def _extreme(material: Material, *, degrees: float, softest: bool) -> float:
 
 
 def confinement(material: Material) -> float:
-    """The stress of semi-confined compression across fibres that lengthen over the stress of unconfined compression across them."""
+    """The ratio of stresses across fibres in semi-confined compression, in which the fibres lengthen, and in unconfined one."""
     return stress(material, SQUEEZED, 90, confined=True) / stress(material, SQUEEZED, 90)
 
 
@@ -107,17 +107,17 @@ def _pulled(name: str, title: str, condition: str, axis: int) -> Quantity:
     """A Poisson ratio in tension across the fibres."""
     fact, title = find(TAKAZA, "poisson_ratio", condition), f"Strip pulled across its fibres: Poisson ratio {title}"
     return Quantity(
-        name, title, TAKAZA, poisson(STRETCHED, 90, axis), (fact,), fact.value, 0.1, "From memory: 0.1.", _BARE
+        name, title, TAKAZA, poisson(STRETCHED, 90, axis), (fact,), fact.value, 0.1, "Recalled: 0.1.", _BARE
     )
 
 
 def _ratio_by_symmetry() -> Quantity:
-    """E along over E across: Poisson's ratios across and along have the same ratio, as the compliance is symmetric."""
+    """The ratio of E along to E across: Poisson's ratios across and along have the same ratio, as the compliance is symmetric."""
     along, across = (find(LOOCKE, "poisson_ratio", words) for words in ("both strains across", "strain along them"))
     truth = along.value / across.value
     within = truth * math.hypot(0.05 / along.value, 0.05 / across.value)
     because = "The ratio of two Poisson ratios, 0.5 and 0.36, each known to within 0.05."
-    title = "Cube in compression: stress along the fibres over stress across them"
+    title = "Cube in compression: ratio of stress along the fibres to stress across them"
     of = stiffness_ratio(SQUEEZED)
     return Quantity("cube_stiffness_ratio", title, LOOCKE, of, (along, across), truth, within, because, _TENSION_ONLY)
 
@@ -125,24 +125,22 @@ def _ratio_by_symmetry() -> Quantity:
 def _confinement() -> Quantity:
     facts = find(WALTER, "axial_stress", "mode II"), find(WALTER, "axial_stress", "at 90 degrees")
     truth, sd = ratio(*facts)
-    because = (
-        "The standard deviation of the ratio of two stresses, -36.7 and -7.7 kPa; their strain is not in the abstract."
-    )
-    title = "Semi-confined compression, fibres lengthen: stress over stress in unconfined compression across the fibres"
+    because = "Standard deviation of the ratio of two stresses, -36.7 and -7.7 kPa; the abstract lacks their strain."
+    title = "Semi-confined compression, fibres lengthen: ratio of stress to that in unconfined compression across the fibres"
     return Quantity("cube_confinement", title, WALTER, confinement, facts, truth, sd, because)
 
 
 def _tension() -> Quantity:
     facts = tuple(find(TAKAZA, "axial_stress", f"{words} the fibres") for words in ("along", "across"))
-    title = "Strip at a stretch of 1.1: stress along the fibres over stress across them"
-    because = "Both stresses are from memory, without deviations: the tolerance is the ratio itself."
+    title = "Strip at a stretch of 1.1: ratio of stress along the fibres to stress across them"
+    because = "Both stresses are recalled, without deviations: the tolerance is the ratio itself."
     truth = facts[0].value / facts[1].value
     of = stiffness_ratio(STRETCHED)
     return Quantity("strip_stiffness_ratio", title, TAKAZA, of, facts, truth, truth, because, _BARE)
 
 
 def _order(name: str, title: str, fact: Fact, of: Callable[[Material], float], limit: str = "") -> Quantity:
-    because = "An order: 1 if it is met by at least 1 %, else 0."
+    because = "A ranking: 1 if reproduced by a margin of at least 1 %, else 0."
     title = f"Cube in compression: {title}"
     return Quantity(name, title, fact.experiment, of, (fact,), 1.0, 0.5, because, limit, is_order=True)
 

@@ -58,11 +58,11 @@ class Ablation:
     omissions: tuple[Omission, ...]
 
     def relative(self, seconds: float) -> float:
-        """A time [s] over the time of the complete run, NaN if one is unknown."""
+        """A time [s] divided by that of the complete run, NaN if either is unknown."""
         return seconds / (self.whole.seconds or math.nan)
 
     def count(self, omission: Omission, name: str) -> float:
-        """One of ``COUNTS`` over its value in the complete run, NaN if one is unknown."""
+        """One of ``COUNTS`` divided by its value in the complete run, NaN if either is unknown."""
         return omission.costs.get(name, math.nan) / (self.whole.costs.get(name) or math.nan)
 
 

@@ -256,7 +256,7 @@ class Transfer:
 
     @property
     def loss(self) -> float:
-        """The error over the least possible error, minus one: 0 if the chosen settings are the best on that case too."""
+        """The ratio of the error to the least possible error, minus one: 0 if the chosen settings are the best on that case too."""
         return self.error / self.best - 1
 
 

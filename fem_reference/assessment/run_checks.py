@@ -26,7 +26,7 @@ from fem_reference.runs.store import Run
 
 # A position is correct up to this share of the body's size; the rounding of stored values is a thousandth of this share.
 ROUNDING = 1e-9
-# Exactly attached vertices may be off their bone by this strain (a stretch of 4) times their distance from attached facets.
+# Exactly attached vertices may be off their place on the bone by this strain (a stretch of 4) times their distance from facets.
 _STRAIN = 3.0
 # Safety factor on the mean extension of springs from the recorded force, as springs pull at other points of the surface.
 _SPRINGS = 1.5
@@ -36,7 +36,7 @@ _TURN = 1.01 * math.pi / 2
 _BETWEEN, _CREASE = 0.25, 0.1
 # Self-contact of a part allows a penetration of less than this share of the spacing, for any recorded pressure.
 _OWN = 0.5
-# A bone that penetrates by more than this share of half its thickness has broken through contact, for any stiffness.
+# A bone that penetrates by more than this share of half its thickness has broken through contact, whatever the stiffness.
 _GIVEN_WAY = 0.75
 # The greatest imbalance of forces, as a multiple of the residual of all unknowns together.
 BALANCE = 10.0
@@ -60,7 +60,7 @@ class RunCheck:
 
     @property
     def share(self) -> float:
-        """The value over the allowed value; infinite if either is not a number, or the value is above an allowed 0."""
+        """The ratio of the value to the allowed value; infinite if either is not a number, or the value is above an allowed 0."""
         return math.inf if math.isnan(share := self.value / (self.allowed or 1e-300)) else share
 
     def __str__(self) -> str:
@@ -163,7 +163,7 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
 
 def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
     """Exact attachments: distance of vertices from their positions moved with the bone, up to a strain times their distance from
-    the attached facets. Springs: their mean extension, which is force over stiffness and area; in situ they have a force at rest.
+    the attached facets. Springs: their mean extension, the force divided by stiffness and area; in situ they carry a force at rest.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets_away = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
@@ -174,13 +174,13 @@ def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iter
         away = run.positions[i][entry.vertices] - apply(entry.bone.pose(number), rest)
         if entry.stiffness is None:
             off, allowed = np.linalg.norm(away, axis=1), ROUNDING * size + _STRAIN * facets_away
-            yield _at(
-                f"{entry.attachment} off {entry.bone.name}", off, allowed, number, run.positions[i][entry.vertices]
-            )
+            places = run.positions[i][entry.vertices]
+            yield _at(f"{entry.attachment} away from {entry.bone.name}", off, allowed, number, places)
         elif forces is not None and skin is not None:
             mean = float(np.linalg.norm(weights @ away) / weights.sum())
             yielded = (float(forces[i]) + at_rest) / (entry.stiffness * float(skin.areas.sum()))
-            yield RunCheck(f"springs of {entry.attachment}, mean", mean, _SPRINGS * yielded + 1e-4 * size, "mm", number)
+            name, most = f"mean extension of springs of {entry.attachment}", _SPRINGS * yielded + 1e-4 * size
+            yield RunCheck(name, mean, most, "mm", number)
 
 
 def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
@@ -195,8 +195,8 @@ def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
             if bone.motion is None or (alike and not turns):
                 continue
             travelled = _travel(bone, before, number) / float(counts[i])
-            words, allowed, unit = ("turns", _TURN, "rad") if turns else ("slides", farthest, "mm")
-            yield RunCheck(f"{bone.name} {words} per load step", travelled, allowed, unit, number)
+            word, allowed, unit = ("rotation", _TURN, "rad") if turns else ("travel", farthest, "mm")
+            yield RunCheck(f"{word} of {bone.name} per load step", travelled, allowed, unit, number)
 
 
 def _travel(bone: Bone, before: float, after: float) -> float:
@@ -219,7 +219,7 @@ def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     for kind, unit, arm in kinds if own and math.isfinite(allowed) else ():
         for i, value in enumerate(() if outer else run.scalars.get(f"net_{kind}", ())):
             yield RunCheck(f"residual {kind}", float(value), allowed * arm, unit, run.numbers[i])
-        carriers = vector_names(run.scalars, f"{kind}_on_")  # bones, and muscles that may touch it
+        carriers = vector_names(run.scalars, f"{kind}_on_")  # bones, and muscles that may touch this muscle
         carried = np.sum([getattr(run, kind)(name) for name in carriers], axis=0)
         for i, load in _loads(problem, run, kind) if outer and carriers else ():
             off, rounding = (float(np.linalg.norm(one)) for one in (carried[i] - load, ROUNDING * load))
@@ -227,7 +227,7 @@ def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
 
 
 def _loads(problem: MuscleProblem, run: Run, kind: str) -> Iterator[tuple[int, Floats]]:
-    """The sum (3,) of external loads by index of the frame: as recorded, and forces that do not depend on the deformation."""
+    """The sums (3,) of external loads by frame index: as recorded, or of forces that do not depend on the deformation."""
     if f"load_{kind}_x" in run.scalars:
         yield from enumerate(scalar_vectors(run.scalars, "load_", kind))
     for i, number in enumerate(run.numbers if kind == "force" else ()):
@@ -266,7 +266,7 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 
 
 def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
-    """Overlap of a bone and the muscle. Above the ``give`` only the excess over rest counts. The bone's middle is never allowed."""
+    """Overlap of a bone and the muscle. Above the ``give`` only the excess over rest counts. The bone's middle always fails."""
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:
@@ -297,4 +297,4 @@ def _creases(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     gives += _CREASE * apart
     for i, number in _states(run, ()):
         depth, place = through_itself(surface.moved_to(run.positions[i]), surface)
-        yield _at("the muscle through itself", np.array([depth]), gives[[i]], number, place[None])
+        yield _at("self-penetration of the muscle", np.array([depth]), gives[[i]], number, place[None])

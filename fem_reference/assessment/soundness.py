@@ -6,10 +6,10 @@ from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume
 from fem_reference.geometry.distance import outer_windings
 from fem_reference.runs.store import Run
 
-# The enclosed volume over the volume in the reference: below the first value the body has collapsed, above the second it has
+# The ratio of enclosed volume to that of the reference: below the first value the body has collapsed, above the second it has
 # exploded. The worst of the shipped solvers has 0.8.
 _LEAST, _MOST = 0.5, 2.0
-# The greatest distance of a vertex from the reference, over the size of the body.
+# The greatest distance of a vertex from the reference, as a multiple of the size of the body.
 _FARTHEST = 1.0
 # The share of the surface that may be inside out, in excess of the share in the reference.
 _TURNED = 0.05

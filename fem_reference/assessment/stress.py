@@ -27,8 +27,8 @@ class Bound(Record):
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """A quantity over frames: ``values`` (f,) in ``unit`` at frame ``numbers``, ``where``: the worst place of each in words;
-    ``points`` (f, 3) [mm]: the worst places, for a quantity with a place.
+    """A quantity over frames: ``values`` (f,) in ``unit`` at frame ``numbers``, ``where``: the worst point of each in words;
+    ``points`` (f, 3) [mm]: the worst points, for a quantity with a place.
     """
 
     quantity: str
@@ -57,7 +57,7 @@ class Scene:
 @dataclass(frozen=True, eq=False)
 class Cell:
     """A hard case by a solver: the verdict, a sentence on the result, the status of the run (empty without a run), the decisive
-    quantity's ``value``, ``bound`` and ``history``, the index ``at`` of its decisive frame, and a picture of the worst place.
+    quantity's ``value``, ``bound`` and ``history``, the index ``at`` of its decisive frame, and a picture of the worst point.
     """
 
     case: str

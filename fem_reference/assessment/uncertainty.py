@@ -118,7 +118,7 @@ class Placed:
 
     @property
     def word(self) -> str:
-        """The worst place over the frames; empty if there is none."""
+        """The worst point over the frames; empty if there is none."""
         found = set(self.places)
         return next((word for word in ("no answer", "outside", "undecided", "inside") if word in found), "")
 

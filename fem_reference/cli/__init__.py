@@ -104,7 +104,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _check_name(name: str | None) -> None:
-    """InputError if ``--name`` cannot be the name of a page: the names of other files beside pages are reserved."""
+    """InputError if ``--name`` cannot be the name of a page: the names of other files next to pages are reserved."""
     from fem_reference.report.asked import LONGEST  # imported here, as packages that it needs may be missing
 
     taken = ("runs", "docs", "index")

@@ -41,7 +41,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
     solving = f"for {ESTIMATION}: also solve the reference with each decomposition into fibres"
     parser.add_argument("--solve", action="store_true", help=solving)
-    size = f"for {TABLE} and {ESTIMATION}: cases at their sizes for quick solutions"
+    size = f"for {TABLE} and {ESTIMATION}: solve the cases at their quick sizes"
     parser.add_argument("--quick", action="store_true", help=size)
     share(parser, "--set", "--error-bar", "--solver-command", "--unit", "--name")
 

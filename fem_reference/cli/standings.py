@@ -29,13 +29,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "a folder NAME with a program NAME.py and its candidate.toml, such as candidates/newton_vbd; may be repeated"
     )
     parser.add_argument("--program", action="append", default=[], type=Path, metavar="DIR", help=program)
-    submitted = "a folder of frames whose candidate.toml has case, name, version and sha256; no code of it is run; may be repeated"
+    submitted = "a folder of frames; candidate.toml has case, name, version, sha256; no code is run; may be repeated"
     parser.add_argument("--submission", action="append", default=[], type=Path, metavar="DIR", help=submitted)
-    only = f"measure again only the rows in these states ({','.join(STATES)}) and new rows, and keep all others"
+    only = f"measure only new rows and the rows in these states ({','.join(STATES)}); keep all others"
     parser.add_argument("--only", default="", metavar="STATES", help=only)
-    limit = "limit of a solver's processor time on a case, not the reference's; slower solvers have no rank (default: %(default)s)"
+    limit = "limit on a solver's processor time per case (not the reference's); slower solvers have no rank (default: %(default)s)"
     parser.add_argument("--time-limit", default=f"{standings.TIME_LIMIT:g} s", metavar="TIME", help=limit)
-    parser.add_argument("--quick", action="store_true", help="cases at their sizes for quick solutions")
+    parser.add_argument("--quick", action="store_true", help="solve the cases at their quick sizes")
     share(parser, "--set", "--name")
 
 
@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     limit = _time(options.time_limit)
     only = {state for state in options.only.split(",") if state}
     if not only <= {*STATES}:
-        raise InputError("--only", f'"{options.only}"', f"some of {','.join(STATES)}")
+        raise InputError("--only", f'"{options.only}"', f"one or more of {','.join(STATES)}")
     cases = [muscle_case(case, options, quick=options.quick) for case in options.cases or standings.CASES]
     entrants = [standings.program(folder) for folder in options.program]
     entrants += [standings.submission(folder) for folder in options.submission]

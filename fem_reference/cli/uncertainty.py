@@ -17,7 +17,7 @@ RUNS = 64
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     share(parser, "case", "--set")
-    many = f"number of runs of the reference, at the case's size for quick solutions (default: {RUNS})"
+    many = f"number of runs of the reference, at the case's quick size (default: {RUNS})"
     parser.add_argument("--runs", type=positive, default=RUNS, metavar="N", help=many)
     parser.add_argument("--seed", type=positive, default=1, metavar="N", help="seed of the sampling (default: 1)")
     share(parser, "--workers", "--scheduler", "--name")

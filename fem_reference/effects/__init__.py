@@ -2,9 +2,9 @@
 
 Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters, with one expression, written once,
 with operators and the functions of ``Functions`` only. So a solver can use the expression symbolically, and a test can evaluate it
-in numpy. An ``Effect`` of a body is of one of three kinds: an ``Energy`` per rest volume, a ``Load`` on a part of its surface (a
-traction, where no energy exists), or a ``Prestrain``, which changes the deformation on which the energies depend. A ``FieldEffect``
-acts on a scalar field psi and has a weak form.
+in numpy. An ``Effect`` of a body is of one of three kinds: an ``Energy`` per unit rest volume, a ``Load`` on a part of its surface
+(a traction, where no energy exists), or a ``Prestrain``, which changes the deformation on which the energies depend. A
+``FieldEffect`` acts on a scalar field psi and has a weak form.
 
 A solver may replace the parameters of an effect by symbols, so that one compiled form serves all their values. So an expression
 never branches on a parameter, and applies only operators and ``state.functions`` to parameters.
@@ -106,8 +106,8 @@ class Ramped(Effect):
 
 
 class Energy(Effect):
-    """An effect with an energy per rest volume; ``stored``: True if the energy is recoverable. The effect acts everywhere, or in a
-    ``region`` of the body (``in``) in proportion to the share of a point in the region.
+    """An effect with an energy per unit rest volume; ``stored``: True if the energy is recoverable. The effect acts everywhere, or
+    in a ``region`` of the body (``in``) in proportion to the share of a point in the region.
     """
 
     stored: ClassVar[bool] = True
@@ -121,11 +121,11 @@ class Energy(Effect):
         return region
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa] at ``state``, for a point that is fully in the region."""
+        """Energy per unit rest volume [MPa] at ``state``, for a point that is fully in the region."""
         raise NotImplementedError(f"{type(self).__name__} has no energy")
 
     def weighted(self, state: State) -> Any:
-        """Energy per rest volume [MPa] at ``state``, multiplied by the share of the point in the region."""
+        """Energy per unit rest volume [MPa] at ``state``, multiplied by the share of the point in the region."""
         return state.share(self.region) * self.energy(state) if self.region else self.energy(state)
 
 
@@ -177,7 +177,7 @@ class PassiveFibres(Energy):
 
 
 class Load(Effect):
-    """A load on the part ``on`` of the surface. If ``stored``, the load has an energy per rest area, otherwise a traction."""
+    """A load on the part ``on`` of the surface. If ``stored``, the load has an energy per unit rest area, otherwise a traction."""
 
     outer: ClassVar[bool] = True
     stored: ClassVar[bool] = False
@@ -189,11 +189,11 @@ class Load(Effect):
         return np.ones(normals.shape, bool)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
-        """Force per rest area [MPa], (3,), for the outward unit normal ``normal`` (3,) at rest."""
+        """Force per unit rest area [MPa], (3,), for the outward unit normal ``normal`` (3,) at rest."""
         raise NotImplementedError(f"{type(self).__name__} has no traction")
 
     def potential(self, state: State, normal: Sequence[Any]) -> Any:
-        """Energy per rest area [N/mm] for the outward unit normal ``normal`` (3,) at rest."""
+        """Energy per unit rest area [N/mm] for the outward unit normal ``normal`` (3,) at rest."""
         raise NotImplementedError(f"{type(self).__name__} has no energy")
 
 
@@ -219,7 +219,7 @@ def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
 
 
 def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
-    """The sum of the energies per rest volume [MPa] of ``acting``, (effect, amount) each, at ``state``, whose F is the total
+    """The sum of the energies per unit rest volume [MPa] of ``acting``, (effect, amount) each, at ``state``, whose F is the total
     deformation gradient. A prestrain changes the F before the step and the present F in the same way, so its ramp causes no rate.
     """
     state = elastic_state(acting, state)
@@ -228,7 +228,7 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
 
 def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator:
     """The indicator of fibres whose tension ``pull`` [MPa] moves the surface of the muscle by a ``distance`` [mm]."""
-    return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, distance, pull)
+    return Indicator("ratio of fibre tension to shear modulus", pull / scene.shear, distance, pull)
 
 
 class FieldEffect(Record):

@@ -9,7 +9,7 @@ from fem_reference.foundations.units import VolumeDamping
 
 
 class Damping(Energy):
-    """A force per rest volume of ``-coefficient v``, with v the velocity relative to the ground.
+    """A force per unit rest volume of ``-coefficient v``, with v the velocity relative to the ground.
 
     Over a load step v is ``rate (u - before)`` (implicit Euler), and the force is minus the derivative of
     ``coefficient / 2 rate |u - before|^2``: a potential of the step, not a stored energy.
@@ -27,7 +27,7 @@ class Damping(Energy):
     def indicator(self, scene: Estimates) -> Indicator:
         """The sag of a beam under the drag, and the shift of a bar along it."""
         force, sideways = (self.coefficient * scene.in_time(speed) for speed in (scene.speed, scene.sideways))
-        rule, stress = "drag per cross-section over the shear modulus", force * scene.length
+        rule, stress = "drag per cross-section divided by the shear modulus", force * scene.length
         lag = scene.lag(scene.bend(sideways) + scene.draw(force))
         return Indicator(rule, stress / scene.shear, lag, stress)
 
@@ -37,6 +37,6 @@ class Damping(Energy):
         return None if found is None else Wrench(*(-self.coefficient * one for one in found))
 
     def energy(self, state: State) -> Any:
-        """The potential of the step per rest volume [MPa]."""
+        """The potential of the step per unit rest volume [MPa]."""
         square = sum((now - before) ** 2 for now, before in zip(state.displacement, state.before, strict=True))
         return self.coefficient / 2 * state.rate * square

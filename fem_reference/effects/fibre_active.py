@@ -14,7 +14,7 @@ PEAK_STRESS = Range(
     high="350 kPa",
     source="specific tension: 22.5 N/cm2 in small mammals, 26.8 as the weighted mean of 96 human values (Persad et al. 2024, "
     "doi 10.1152/japplphysiol.00296.2024, abstract); 30 (SD 5) N/cm2 in the quadriceps of 27 men (In vivo specific tension of "
-    "the human quadriceps femoris muscle, Eur J Appl Physiol 2009, abstract); Zajac's value (1989) is also 0.35 MPa, from memory",
+    "the human quadriceps femoris muscle, Eur J Appl Physiol 2009, abstract); Zajac's value (1989) is also 0.35 MPa, recalled",
 )
 
 
@@ -43,7 +43,7 @@ class FibreActive(Ramped, Energy):
         return fibre_indicator(scene, pull, scene.straighten(pull))
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa], zero at rest."""
+        """Energy per unit rest volume [MPa], zero at rest."""
         now, rest = state.fibre_stretch / self.optimal_stretch, 1 / self.optimal_stretch
         return state.amount * self.stress * (_area(now, state) - _area(rest, state))
 

@@ -9,7 +9,7 @@ from fem_reference.effects.fibre_active import PEAK_STRESS
 from fem_reference.foundations.limits import Limit, Range
 from fem_reference.foundations.units import PositivePressure
 
-# In this form Thelen's exp(k (l - 1)/e) - 1 over exp(k) - 1 has p1 = 1 / (exp(k) - 1) and p2 = k / e; k = 5, e = 0.6.
+# In this form Thelen's exp(k (l - 1)/e) - 1, divided by exp(k) - 1, has p1 = 1 / (exp(k) - 1) and p2 = k / e; k = 5, e = 0.6.
 _SOURCE = (
     "Blemker, Pinsky and Delp 2005 (doi 10.1016/j.jbiomech.2004.04.009: 0.05 and 6.6, as in FEBio's manual) to Thelen 2003 "
     "(doi 10.1115/1.1531112: exponent 5 and strain 0.6 at the peak active stress, as in OpenSim, so 0.00678 and 8.33); "
@@ -54,7 +54,7 @@ class FibrePassive(PassiveFibres):
         return Moduli(fibres=self.stress)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa], zero in slack fibres."""
+        """Energy per unit rest volume [MPa], zero in slack fibres."""
         p1, p2, exp = self.p1, self.p2, state.functions.exp
         stretch = state.fibre_stretch / self.optimal_stretch
         toe = state.between(1, self.linear_from, stretch) - 1

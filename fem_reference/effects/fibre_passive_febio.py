@@ -29,7 +29,7 @@ class FibrePassiveFebio(PassiveFibres):
     linear_from: float = Field(gt=1)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa], zero in slack fibres."""
+        """Energy per unit rest volume [MPa], zero in slack fibres."""
         exp, log, stretch = state.functions.exp, state.functions.log, state.fibre_stretch
         toe = state.between(1, self.linear_from, stretch) - 1
         line = state.functions.above(stretch, self.linear_from, stretch, self.linear_from)

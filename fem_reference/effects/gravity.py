@@ -25,13 +25,13 @@ class Gravity(Ramped, Energy):
     def indicator(self, scene: Estimates) -> Indicator:
         """The sag of a beam under the weight."""
         force = scene.greatest(self) * self.density * math.hypot(*self.acceleration)
-        rule, stress = "weight per cross-section over the shear modulus", force * scene.length
+        rule, stress = "weight per cross-section divided by the shear modulus", force * scene.length
         return Indicator(rule, stress / scene.shear, scene.bend(force), stress)
 
     def resultant(self, shape: Shape) -> Wrench:
         return dead(self.density * np.array(self.acceleration), shape)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa], zero at rest."""
+        """Energy per unit rest volume [MPa], zero at rest."""
         work = sum(g * u for g, u in zip(self.acceleration, state.displacement, strict=True))
         return -state.amount * self.density * work

@@ -28,7 +28,7 @@ class Guccione(Energy):
         return Moduli(shear=self.c * self.bt / 2)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]; ``|E fibre|^2`` and ``|E|^2`` give the sums over s and n."""
+        """Energy per unit rest volume [MPa]; ``|E fibre|^2`` and ``|E|^2`` give the sums over s and n."""
         C, f, factor = state.C, state.fibre, state.J ** (-2 / 3)
         E = [[(factor * C[i][k] - (i == k)) / 2 for k in range(3)] for i in range(3)]
         along = [sum(E[i][k] * f[k] for k in range(3)) for i in range(3)]

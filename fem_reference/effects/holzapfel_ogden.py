@@ -26,7 +26,7 @@ class HolzapfelOgden(Energy):
     normal: Annotated[tuple[float, float, float], AfterValidator(partial(directed, name="a normal"))]
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa], zero in slack families."""
+        """Energy per unit rest volume [MPa], zero in slack families."""
         f, functions = state.fibre, state.functions
         across = [self.normal[i] * f[k] - self.normal[k] * f[i] for i, k in ((1, 2), (2, 0), (0, 1))]
         length = functions.sqrt(sum(entry**2 for entry in across))

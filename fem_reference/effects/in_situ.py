@@ -12,9 +12,9 @@ class InSitu(Prestrain):
     """The energies depend on ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``, l the ``stretch`` along the fibre f. A stress at
     rest balances all effects at the first frame, an activation included, so that ``F = 1`` is in equilibrium there.
 
-    The energy of this stress per rest volume is ``2 mu dev(e) : E + p0 (J - 1)``, ``E = (F^T F - 1) / 2``, with fixed fields ``e``
-    and ``p0``, so the stress rotates with the body. ``e`` and ``p0`` are the strain and pressure of an isotropic body under the
-    forces at rest, with the shear and bulk modulus at rest of the scene's effects. This stress has the least energy of all that
+    The energy of this stress per unit rest volume is ``2 mu dev(e) : E + p0 (J - 1)``, ``E = (F^T F - 1) / 2``, with fixed fields
+    ``e`` and ``p0``, so the stress rotates with the body. ``e`` and ``p0`` are the strain and pressure of an isotropic body under
+    the forces at rest, with the shear and bulk modulus at rest of the scene's effects. This stress has the least energy of all that
     balance these forces. The isotropic body is supported by the springs of attachments, which are extended at rest, and by the
     bones. Bones press where the muscle touches them or is within ``support`` of them (``contact``), through the tissue in between.
 
@@ -43,8 +43,8 @@ def moduli_of(effects: Sequence[Effect]) -> tuple[float, float]:
 
 
 def balancing(state: State, slopes: Sequence[Sequence[Any]], pressure: Any, shear: Any) -> Any:
-    """The energy per rest volume [MPa] of the stress at rest at ``state``, whose F is the total deformation gradient; ``e`` is the
-    symmetric part of ``slopes`` (3, 3), mu the modulus ``shear`` [MPa] and p0 the ``pressure`` [MPa].
+    """The energy per unit rest volume [MPa] of the stress at rest at ``state``, whose F is the total deformation gradient; ``e`` is
+    the symmetric part of ``slopes`` (3, 3), mu the modulus ``shear`` [MPa] and p0 the ``pressure`` [MPa].
     """
     C, mean = state.C, sum(slopes[i][i] for i in range(3)) / 3
     strained = sum((slopes[i][k] + slopes[k][i]) / 2 * (C[i][k] - (i == k)) for i in range(3) for k in range(3))

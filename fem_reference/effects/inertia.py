@@ -11,7 +11,7 @@ from fem_reference.foundations.units import Density
 
 
 class Inertia(Energy):
-    """A force per rest volume of ``-density a``, with a the acceleration, integrated by an implicit method of second order.
+    """A force per unit rest volume of ``-density a``, with a the acceleration, integrated by an implicit method of second order.
 
     The method is the member of the generalised-alpha family with stresses taken at the end of a step (Wood, Bossak and Zienkiewicz
     1980, doi 10.1002/nme.1620151011; Chung and Hulbert 1993, doi 10.1115/1.2900803, with alpha_f = 0): ``alpha = (r - 1) / (r +
@@ -31,7 +31,7 @@ class Inertia(Energy):
     spectral_radius: float = Field(default=0.9, ge=0, le=1)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The lag of a beam under its inertial force, and the stress of the wave that a jump of velocity sends through the
+        """The lag of a beam under its inertial force, and the stress of the wave that a jump in velocity sends through the
         beam. The first frequency of the beam follows from its deflection under its own weight.
         """
         square = scene.bend(self.density)  # the inverse square of the frequency
@@ -39,15 +39,15 @@ class Inertia(Energy):
         lag = scene.lag(max(square * acceleration, math.sqrt(square) * jump))
         stress = max(self.density * acceleration * scene.length, math.sqrt(self.density * scene.shear) * jump)
         cauchy = self.density * scene.in_time(scene.speed) ** 2 / scene.shear
-        return Indicator("Cauchy number, density times speed squared over shear modulus", cauchy, lag, stress)
+        return Indicator("Cauchy number, density times speed squared divided by shear modulus", cauchy, lag, stress)
 
     def energy(self, state: State) -> Any:
-        """The potential of the step per rest volume [MPa]."""
+        """The potential of the step per unit rest volume [MPa]."""
         square = sum((now - then) ** 2 for now, then in zip(state.displacement, state.predicted, strict=True))
         return self.density * (1 + self.spectral_radius) * state.rate**2 * square
 
     def kinetic(self, velocity: Any) -> Any:
-        """The kinetic energy per rest volume [MPa] at a ``velocity`` (3,) [mm/s]."""
+        """The kinetic energy per unit rest volume [MPa] at a ``velocity`` (3,) [mm/s]."""
         return self.density / 2 * sum(component**2 for component in velocity)
 
     def predicted(self, u: Any, v: Any, a: Any, seconds: float) -> Any:

@@ -10,8 +10,8 @@ from fem_reference.foundations.units import PositiveLength, PositivePressure
 
 
 class Membrane(Load):
-    """``h mu/2 (I + 1/a^2 - 3)`` per rest area, with ``I = tr C - N . C N`` the sum of the squared stretches in the surface, a the
-    ratio of present area to area at rest, and N the normal at rest: an incompressible neo-Hookean sheet in plane stress, whose
+    """``h mu/2 (I + 1/a^2 - 3)`` per unit rest area, with ``I = tr C - N . C N`` the sum of the squared stretches in the surface, a
+    the ratio of present area to area at rest, and N the normal at rest: an incompressible neo-Hookean sheet in plane stress, whose
     thickness follows from its area (Holzapfel 2000, Nonlinear Solid Mechanics, ch. 6.2, on membranes).
 
     ``on``: the part of the surface; ``in``, if given: a region, in which the effect acts in proportion to the share, linear between
@@ -29,7 +29,7 @@ class Membrane(Load):
     region: str = Field(default="", alias="in", exclude_if=lambda region: not region)
 
     def potential(self, state: State, normal: Sequence[Any]) -> Any:
-        """Energy per rest area [N/mm], multiplied by the share of the point in the region."""
+        """Energy per unit rest area [N/mm], multiplied by the share of the point in the region."""
         area = sum(sum(c * n for c, n in zip(row, normal, strict=True)) ** 2 for row in state.cofactors)
         inside = state.I1 - state.square_stretch(normal)
         return state.share(self.region) * self.thickness * self.mu / 2 * (inside + 1 / area - 3)

@@ -29,7 +29,7 @@ class Pressure(Ramped, Load):
         """The distance by which the pressure compresses the muscle's thickness."""
         load = scene.greatest(self) * abs(self.pressure)
         part = load / scene.shear
-        return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3, load)
+        return Indicator("ratio of pressure to shear modulus", part, part * scene.thickness / 3, load)
 
     def resultant(self, shape: Shape) -> Wrench | None:
         """The load on the entire part in its present shape."""

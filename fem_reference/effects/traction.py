@@ -14,9 +14,9 @@ from fem_reference.foundations.units import PressureVector
 
 
 class Traction(Ramped, Load):
-    """``amount t``: a force per area at rest, whose direction and size do not depend on the deformation.
+    """``amount t``: a force per unit rest area, whose direction and size do not depend on the deformation.
 
-    ``on``: the part of the surface; ``force``: t, the force per area at rest (3,) [MPa].
+    ``on``: the part of the surface; ``force``: t, the force per unit rest area (3,) [MPa].
     """
 
     example: ClassVar[dict[str, Any]] = {"force": "0, 6.25, 1 kPa"}
@@ -26,7 +26,7 @@ class Traction(Ramped, Load):
         """The distance by which the load extends the muscle."""
         load = scene.greatest(self) * math.hypot(*self.force)
         part = load / scene.shear
-        return Indicator("traction over the shear modulus", part, part * scene.length / 3, load)
+        return Indicator("ratio of traction to shear modulus", part, part * scene.length / 3, load)
 
     def resultant(self, shape: Shape) -> Wrench:
         """The load on the entire part."""

@@ -30,11 +30,11 @@ class Viscosity(Energy):
         """The lag of a body, as a share of its travel, from its relaxation time."""
         rate = scene.in_time(scene.speed) / scene.length
         deborah = self.eta / scene.shear * rate
-        rule, lag = "Deborah number, relaxation time over the time of the motion", 0.25 * deborah * scene.travel
+        rule, lag = "Deborah number, relaxation time divided by the time of the motion", 0.25 * deborah * scene.travel
         return Indicator(rule, deborah, scene.lag(lag), 2 * self.eta * rate)
 
     def energy(self, state: State) -> Any:
-        """The potential of the step per rest volume [MPa]."""
+        """The potential of the step per unit rest volume [MPa]."""
         before = State(F=state.F_before)
         axes, now, then = before.cofactors, state.C, before.C
         grown = [[now[i][k] - then[i][k] for k in range(3)] for i in range(3)]

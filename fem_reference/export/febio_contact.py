@@ -2,8 +2,8 @@
 
 FEBio's ``tied-elastic`` pulls with a traction: its penalty times the vector from a point of the first surface to the point of the
 second surface that was nearest at rest, minus this vector at rest. The traction is integrated over the present first surface, a
-rigid copy of the attached area, which keeps its rest area. So it acts like the springs of an attachment: a stiffness per rest area,
-equal in all directions. Springs at points of the muscle's surface are small rigid triangles at the nearest points of the tets.
+rigid copy of the attached area, which keeps its rest area. So it acts like the springs of an attachment: a stiffness per unit rest
+area, equal in all directions. Springs at surface points are small rigid triangles at the nearest points of the tets.
 """
 
 from collections.abc import Iterator

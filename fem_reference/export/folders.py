@@ -1,4 +1,4 @@
-"""The new folder of an export, written completely or not at all, and its texts; their templates are beside this module."""
+"""The new folder of an export, written completely or not at all, and its texts; their templates are next to this module."""
 
 import os
 import shutil

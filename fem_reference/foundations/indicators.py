@@ -42,7 +42,7 @@ class Estimates:
     from the straight line between two of these bones. ``lean``: the inclination of fibres to this line, from 0 to 1. ``travel``:
     the greatest displacement of the surface due to the bones. ``stretch``: the least and the greatest stretch of the line between
     the attachments, used as stretch of the fibres. ``interval``: the time between frame numbers, None if not stated. ``speed``,
-    ``sideways``, ``jump``, ``acceleration``: the greatest speed, sideways speed of the line, sudden change of velocity, and
+    ``sideways``, ``jump``, ``acceleration``: the greatest speed, sideways speed of the line, sudden change in velocity, and
     acceleration, per frame number. ``frames``: all frame numbers, and knots of ramps. ``tolerance`` [mm], ``stress_tolerance``
     [MPa]: an effect that changes less is not needed. ``near``: the nearness to each bone.
     """
@@ -78,7 +78,7 @@ class Estimates:
         return float(0.3 * middle) / (1 + self.taut(self.tension))
 
     def taut(self, pull: float) -> float:
-        """Stiffness that the beam of :meth:`bend` gains from the ``pull`` [MPa] of its fibres, over its bending stiffness."""
+        """Stiffness that the beam of :meth:`bend` gains from the ``pull`` [MPa] of its fibres, relative to bending stiffness."""
         return pull / self.shear * (self.length / self.thickness) ** 2 / 12
 
     def draw(self, force: float) -> float:
@@ -106,5 +106,5 @@ class Estimates:
         return share * self.length * pull / (pull + 3 * self.shear)
 
     def in_time(self, rate: float) -> float:
-        """A ``rate`` per frame number, converted to a rate per second; 0 if the frame interval is not known."""
+        """A ``rate`` per frame number, converted to a rate per second; 0 if the frame interval is unknown."""
         return rate / self.interval if self.interval else 0.0

@@ -41,7 +41,7 @@ class Shape(Protocol):
 
 
 def dead(density: ArrayLike, shape: Shape, on: str | None = None) -> Wrench:
-    """The wrench of a force of ``density`` (3,) per volume or area at rest, which moves with the body and keeps its direction."""
+    """The wrench of a force of ``density`` (3,) per unit rest volume or area, which moves with the body and keeps its direction."""
     (measure, first), each = shape.measure(on), np.asarray(density, float)
     return Wrench(each * measure, np.cross(first, each))
 

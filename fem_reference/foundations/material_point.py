@@ -144,7 +144,7 @@ class Place:
 
 
 def fibre_tension(energy: Callable[[State], Any], stretch: float, step: float = 1e-6) -> float:
-    """The force per rest area [MPa] along fibres at a ``stretch`` and constant volume, by central differences of an ``energy``."""
+    """The force per unit rest area [MPa] along fibres at a ``stretch`` and constant volume, by differences of an ``energy``."""
 
     def along(length: float) -> float:
         across = length**-0.5

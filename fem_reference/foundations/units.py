@@ -14,7 +14,7 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator, TypeAdapter
 
-# The allowed units [mm] of coordinates in a file: in scenes, beside frames and on the command line. Quantities with a number may
+# The allowed units [mm] of coordinates in a file: in scenes, next to frames and on the command line. Quantities with a number may
 # have any unit of their kind; for coordinates a slip such as "Mm", 1e9 mm, would not be noticed.
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft": 304.8}
 

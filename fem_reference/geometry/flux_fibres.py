@@ -1,8 +1,8 @@
 """Fibres by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves evenly over the other.
 
 The flux per area of an attachment is constant, so lines that start evenly over one attachment end evenly over the other, and cover
-both. In contrast, the gradient of a potential that is constant on attachments is concentrated at their rims. In a sheet with a
-fully attached face, nearly all its lines start at the edge next to the other attachment.
+both areas. In contrast, the gradient of a potential that is constant on attachments is concentrated at their rims. In a sheet with
+a fully attached face, nearly all its lines start at the edge next to the other attachment.
 """
 
 from dataclasses import dataclass
@@ -79,7 +79,7 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
 
 
 def streamlines(flux: Flow, count: int) -> Polylines:
-    """``count`` lines of 40 points along a ``flux``, each for the same area of both attachments; InputError if fewer can be traced.
+    """``count`` lines of 40 points along a ``flux``, each for an equal area of both attachments; InputError if fewer can be traced.
 
     Many lines start evenly over the area; the lines kept are the middles of groups that are compact at both ends (Lloyd 1982),
     measured in units of the size of each attachment.
@@ -107,7 +107,7 @@ def _numbers(triangles: Ints, facets: Ints) -> Ints:
 
 
 def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:
-    """``count`` places (n, 3) [mm], evenly over the area where the flow begins, and the tetrahedron (n,) of each."""
+    """``count`` places (n, 3) [mm], spread evenly over the area where the flow begins, and the tetrahedron (n,) of each."""
     mesh, facets = flux.mesh, flux.start
     shares = np.cumsum(triangle_areas(mesh.points, facets))
     facet = np.searchsorted(shares / shares[-1], (np.arange(count) + 1 / _PLASTIC) / count)  # never on a facet's rim

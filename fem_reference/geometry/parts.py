@@ -137,7 +137,7 @@ def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) 
 
 
 def _flatness(points: Floats, triangles: Ints) -> Floats:
-    """4 sqrt(3) area over the sum of the squared sides of each triangle, (m,): 1 if equilateral, 0 if degenerate."""
+    """4 sqrt(3) area divided by the sum of the squared sides of each triangle, (m,): 1 if equilateral, 0 if degenerate."""
     squares = np.sum((points[triangles] - points[np.roll(triangles, 1, axis=1)]) ** 2, axis=(1, 2))
     return np.asarray(4 * np.sqrt(3) * triangle_areas(points, triangles) / np.maximum(squares, _TINY))
 

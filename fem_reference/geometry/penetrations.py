@@ -231,7 +231,7 @@ class _Sides:
         self.parts = [Surface(surface.points, surface.triangles[some]) for some in (counts, ~counts)]
 
     def may_count(self, centres: Floats, reach: float) -> NDArray[np.bool_]:
-        """Mask (n,) of the balls of radius ``reach`` about ``centres`` (n, 3) that may contain counted points."""
+        """Mask (n,) of the spheres of radius ``reach`` about ``centres`` (n, 3) that may contain counted points."""
         counting, other = self._distances(centres)
         found = counting - other <= 2 * reach
         deep = found & (np.minimum(counting, other) > reach)

@@ -81,7 +81,7 @@ class HalfSpace(Exact):
 
 @dataclass(frozen=True)
 class Sphere(Exact):
-    """A ball of ``radius`` [mm] about ``centre`` [mm]."""
+    """A sphere of ``radius`` [mm] about ``centre`` [mm]."""
 
     centre: Vector
     radius: float

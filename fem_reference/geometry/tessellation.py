@@ -1,6 +1,6 @@
 """Closed triangulated surfaces of bones of simple shapes, for pictures and for code that needs the surface of a bone.
 
-Their vertices lie on the body. A ball, a capsule and a box are built in the same way, from the octants of a sphere moved apart.
+Their vertices lie on the body. A sphere, a capsule and a box are built in the same way, from the octants of a sphere moved apart.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""The shortest paths around several smooth obstacles: straight pieces and geodesics in turn, joined without kinks.
+"""The shortest paths around several smooth obstacles: alternating straight pieces and geodesics, joined without kinks.
 
 A taut string finds the obstacles that a path touches, and approximately where; Newton's method then finds the point, direction and
 length of each geodesic for which all pieces join smoothly (Scholz et al. 2016, Multibody Syst. Dyn. 36, 195-219, DOI
@@ -16,7 +16,7 @@ from fem_reference.geometry.taut_strings import MOST, Flags, halved, longest, me
 
 # Steps of a geodesic; the error at its end is about (length / radius)^5 / (120 _STEPS^4) of the radius, 1e-7 for half a turn.
 _STEPS = 60
-# Newton's iterations, their tolerance [share of the distance between the ends] and the step of their finite differences.
+# The limit on Newton iterations, their tolerance [share of the distance between the ends], and the finite-difference step.
 _ITERATIONS, _SMALL, _STEP = 40, 1e-11, 1e-6
 # Number of points at which a path is checked for crossing an obstacle, besides the deepest points of its chords.
 _CHECKED = 200
@@ -24,10 +24,10 @@ _CHECKED = 200
 
 @dataclass(frozen=True, eq=False)
 class Winding:
-    """n paths through K ``knots`` (n, K, 3) [mm], whose unit ``tangents`` are (n, K, 3), after the lengths ``arcs`` (n, K) [mm].
+    """n paths through K ``knots`` (n, K, 3) [mm], with unit ``tangents`` (n, K, 3) and arc lengths ``arcs`` (n, K) [mm].
 
-    The paths follow the obstacles ``met`` (n, m) in turn, each over the same number of knots; on a path with fewer than m obstacles
-    the remaining knots are at the end. ``failed`` (n,) is True if Newton's method found no path.
+    The paths pass the obstacles ``met`` (n, m) in this order, each over the same number of knots; on a path with fewer than m
+    obstacles the remaining knots are at the end. ``failed`` (n,) is True if Newton's method found no path.
     """
 
     knots: Floats
@@ -47,7 +47,7 @@ class Winding:
         return cls(knots, tangents, arcs, np.zeros((len(starts), count), np.int64), np.zeros(len(starts), bool))
 
     def put(self, pattern: tuple[int, ...], which: Ints, pieces: "_Pieces", same: Ints) -> None:
-        """Store the rows ``same`` of geodesics on the obstacles of a ``pattern`` as the paths ``which``."""
+        """Store the rows ``same`` of ``pieces``, which are geodesics on the obstacles of a ``pattern``, as the paths ``which``."""
         size = _STEPS + 1
         steps = np.zeros((len(which), self.knots.shape[1] - 1))
         for i, (points, tangents) in enumerate(pieces.run()):
@@ -73,7 +73,7 @@ class Winding:
         return self.tangents[:, 0], self.tangents[:, -1]
 
     def touching(self) -> list[Touch]:
-        """The obstacles that paths meet, in turn."""
+        """The obstacles that paths touch, in order."""
         size, found = _STEPS + 1, []
         for i in range(self.met.shape[1]):
             one, other = 1 + i * size, (i + 1) * size
@@ -95,8 +95,8 @@ class Winding:
 
 @dataclass(eq=False)
 class _Pieces:
-    """Geodesics on the m ``obstacles`` that n paths meet in turn: their first ``points``, their directions ``along`` there, both
-    (m, n, 3), and their lengths ``sizes`` (m, n) [mm].
+    """Geodesics on the m ``obstacles`` that n paths touch in this order: their first ``points``, their directions ``along`` there,
+    both (m, n, 3), and their lengths ``sizes`` (m, n) [mm].
     """
 
     obstacles: list[SmoothSurface]
@@ -134,7 +134,7 @@ class _Pieces:
         return np.array([one.bending(*at) > 0 for one, at in zip(self.obstacles, middles, strict=True)])
 
     def moved(self, change: Floats) -> "_Pieces":
-        """The geodesics after changes (n, 4 m) of each: start along and across [mm], direction [rad], length [mm]."""
+        """The geodesics after changes (n, 4 m): of the start, along and across [mm], the direction [rad] and the length [mm]."""
         points, along, sizes = [], [], []
         for i, obstacle in enumerate(self.obstacles):
             ahead, aside, turn, longer = (change[:, 4 * i + k] for k in range(4))
@@ -249,7 +249,7 @@ def _better(pieces: _Pieces, change: Floats, before: Floats) -> tuple[_Pieces, F
 
 
 def _geodesic(obstacle: SmoothSurface, points: Floats, along: Floats, sizes: Floats) -> tuple[Floats, Floats]:
-    """Points and unit tangents (steps + 1, n, 3) from ``points`` ``along`` (n, 3) by ``sizes`` (n,), by the Runge-Kutta method."""
+    """Points and unit tangents (steps + 1, n, 3) of geodesics of ``sizes`` (n,) from ``points`` ``along`` directions, (n, 3)."""
     step, path = (sizes / _STEPS)[:, None], [(points, along)]
     half, bent = step / 2, obstacle.curving
     for _ in range(_STEPS):

@@ -1,4 +1,4 @@
-"""Time series in XDMF, read with meshio, with their numbers in the file itself or in HDF5 files beside it."""
+"""Time series in XDMF, read with meshio, with their numbers in the file itself or in HDF5 files next to it."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -36,7 +36,7 @@ def _displacement(data: dict[str, Any], points: Floats) -> Any:
 
 
 def _check(item: Element, path: Path) -> None:
-    """Raise ValueError if numbers are not in the file at ``path`` or in HDF5 files beside it, or are too many."""
+    """Raise ValueError if numbers are not in the file at ``path`` or in HDF5 files next to it, or are too many."""
     if item.get("Format") == "XML":
         return
     if item.get("Format") != "HDF":

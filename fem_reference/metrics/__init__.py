@@ -36,7 +36,7 @@ class Statistic:
 
     ``title`` and ``part``: headings of the group of columns and of the column. ``headline``: a sentence with ``{}`` for the value.
     ``curve``: the title of the plot of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: its rank by
-    place, from the least. ``local``: True if its error has the order of the error at the worst place. ``lone``: True for the value
+    place, from the least. ``local``: True if its error has the order of the error at the worst point. ``lone``: True for the value
     of a single fibre or of the force on a bone, which is not a mean. ``pooled``: True if the statistics of its metric belong to one
     field in one unit; the rms of all then replaces a difference that is small by chance.
     """
@@ -66,7 +66,7 @@ class Statistic:
 @dataclass(frozen=True, eq=False)
 class Measure:
     """One statistic of one metric: ``values`` (f,) in ``unit`` at frame ``numbers`` (f,), which count from 0 if not given.
-    ``where`` (f,): the worst place at each frame, in words. ``error_bars`` (f,): bars of the reference, None if it has none.
+    ``where`` (f,): the worst point at each frame, in words. ``error_bars`` (f,): bars of the reference, None if it has none.
     """
 
     metric: str
@@ -242,7 +242,7 @@ def measure(run: Run, reference: Run, context: Context, wanted: Iterable[str] | 
 
 
 def measures(name: str, values: Mapping[str, Floats], where: Collection[str] = ()) -> tuple[Measure, ...]:
-    """The measures of the metric ``name`` from ``values`` (f,) by statistic; ``where`` (f,): the worst places of all, if known."""
+    """The measures of the metric ``name`` from ``values`` (f,) by statistic; ``where`` (f,): the worst points of all, if known."""
     stated = metric(name).STATISTICS
     return tuple(
         Measure(name, one, stated[one].unit, each, tuple(where) or ("",) * len(each)) for one, each in values.items()

@@ -35,7 +35,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
 
 def over_edges(name: str, deviations: Floats, edges: Edges, reference: Run, **more: Floats) -> tuple[Measure, ...]:
-    """The measures ``name`` from ``deviations`` (f, e) by edge and ``more`` (f,); the worst place: the edge that deviates most."""
+    """The measures ``name`` from ``deviations`` (f, e) by edge and ``more`` (f,); the worst point: the edge that deviates most."""
     size = np.abs(deviations)
     values = {
         "mean": deviations @ edges.areas / edges.areas.sum(),

@@ -1,5 +1,5 @@
-"""Energy stored in a muscle by all its effects, springs and contact; only some solvers compute it. The moment about a joint is
-minus its derivative by the angle. Without dissipation its change is the work of the bones; at rest it is due to initial stresses.
+"""Energy stored in a muscle by all its effects, springs and contact; only some solvers compute it. Its derivative with respect to a
+joint angle is minus the moment. Without dissipation its change is the work of the bones; at rest it is due to initial stresses.
 """
 
 from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures

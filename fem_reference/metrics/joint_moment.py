@@ -1,10 +1,10 @@
 """Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis. A
-moment is positive if it turns the bone to greater angles; its moment arm is the moment over the force. The axis is fixed in space.
-By virtual work, without dissipation, the moment is minus the derivative of the stored energy with respect to the angle. Lines of
-action pull at their ends, via-points and obstacles. The force is not known for lines without ``hill`` and for most fast solvers.
+moment is positive if it turns the bone to greater angles; its moment arm is the moment divided by the force. The axis is fixed in
+space. By virtual work, without dissipation, the moment is minus the derivative of the stored energy with respect to the angle.
+Lines of action pull at ends, via-points and obstacles. The force is unknown for lines without ``hill`` and most fast solvers.
 
-The arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with little
-force (docs/measures.md).
+The moment arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with
+little force (docs/measures.md).
 """
 
 from functools import partial
@@ -31,11 +31,11 @@ STATISTICS = {
         "N", "Joint", "force", curve="Force of the muscle on the bone of the joint", shown={"curve": 27, "angle": 27}
     ),
     "arm": _of_one(
-        "mm", "Joint", "arm by force", curve="Moment arm by force: moment over force", shown={"curve": 28, "angle": 28}
+        "mm", "Joint", "moment arm by force", curve="Moment arm: moment / force", shown={"curve": 28, "angle": 28}
     ),
 }
 OF, AGAINST = "lines", "reference"
-_LEAST = 1e-6  # a force below this share of the greatest force is round-off and has no arm
+_LEAST = 1e-6  # a force below this share of the greatest force is round-off and has no moment arm
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
@@ -56,7 +56,7 @@ def _has_force(run: Run, joint: Joint) -> bool:
 
 
 def _values(run: Run, joint: Joint) -> Floats:
-    """Moment, force and arm by frame (3, f).
+    """Moment, force and moment arm by frame (3, f).
 
     For a muscle that is a line between two bones, or around obstacles on these bones, the arm is ``-dl/dtheta``. For any other
     muscle it is, by virtual work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.

@@ -1,9 +1,9 @@
 """Moment arms of the fibres about the rotating joint, by the tendon excursion method: ``-dl/dtheta`` (An et al. 1984).
 
-``l`` [mm] is the length of a fibre, ``theta`` [rad] the angle of the joint; an arm is positive if the muscle shortens as the angle
-grows, as in OpenSim. The slope is taken from the parabola through three frames; its error is of second order in their angles. A
-frame at which the joint is at rest takes the slope of the frames nearest in time. If more than one bone moves, lengths do not
-depend on one angle alone, and the arm is NaN. A case without a joint has no moment arms.
+``l`` [mm] is the length of a fibre, ``theta`` [rad] the angle of the joint; the moment arm is positive if the muscle shortens as
+the angle grows, as in OpenSim. The slope is taken from the parabola through three frames; its error is of second order in their
+angles. A frame at which the joint is at rest takes the slope of the frames nearest in time. If more than one bone moves, lengths do
+not depend on one angle alone, and the arm is NaN. A case without a joint has no moment arms.
 """
 
 from collections.abc import Iterator, Sequence

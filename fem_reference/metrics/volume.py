@@ -7,7 +7,7 @@ from fem_reference.metrics import Measure, MeasurementContext, Shown, Statistic,
 from fem_reference.runs.store import Run
 
 _FIRST: tuple[Shown, ...] = ("main", "table", "curve", "solvers", "scenes")  # places at which the volume comes first
-# The volume is nearly constant, so its error hardly shows the order of convergence; the order of the worst place is used.
+# The volume is nearly constant, so its error hardly shows the order of convergence; the order of the worst point is used.
 STATISTICS = {
     "deviation": Statistic(
         "%",

@@ -92,7 +92,7 @@ def check_stiffness(effects: tuple[Effect, ...], place: str) -> None:
     for kind, modulus, law in (("shape", found.shear, "neo_hooke"), ("volume", found.bulk, "incompressible")):
         if not modulus > 0:
             got = f"effects that do not resist a change of {kind} at rest"
-            raise InputError(place, got, f'a law that does, such as "{law}", beside fibres and loads')
+            raise InputError(place, got, f'a law that does, such as "{law}", besides fibres and loads')
 
 
 def check_quadrature(element: str, degree: int | None, place: str) -> None:

@@ -30,7 +30,7 @@ _FARTHEST = 1e9  # the greatest distance [mm] of a point from the origin
 _MOST = 100_000  # the largest number of frames
 _MOST_CELLS = 10_000_000  # the largest number of cells of a box
 _SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each other
-_THINNEST = 1e6  # length over thickness of a cell: stiffnesses differ by the square of this ratio, too much for doubles
+_THINNEST = 1e6  # length / thickness of a cell: stiffnesses differ by the square of this ratio, too much for doubles
 
 
 def check(body: Body, element: str, quadrature_degree: int | None = None) -> None:

@@ -36,8 +36,8 @@ class ContactBone:
 class ContactLaw:
     """Contact of bones with any amount of sliding. ``on``: the name of a region of facets, or a skin. The pressure depends on the
     gap g, the signed distance (negative inside): zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k
-    g`` below -d. It is the slope of an energy per rest area that is twice differentiable. ``stiffness``: k [MPa/mm]; under pressure
-    p a surface penetrates by p / k.
+    g`` below -d. It is the slope of an energy per unit rest area that is twice differentiable. ``stiffness``: k [MPa/mm]; under
+    pressure p a surface penetrates by p / k.
 
     ``relaxed``: two frame numbers between which an overlap at rest is removed gradually: at the first it causes no pressure, from
     the second on it counts in full.

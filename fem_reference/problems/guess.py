@@ -46,7 +46,7 @@ def distance(bone: Bone, points: Floats) -> Floats:
 
 
 def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float, float, float, float]:
-    """The greatest speed, speed perpendicular to an ``axis`` (3,), jump of velocity, and acceleration of a guess, per frame number;
+    """The greatest speed, speed perpendicular to an ``axis`` (3,), jump in velocity, and acceleration of a guess, per frame number;
     each is a root mean square over its points. A jump is a change of velocity much greater than at most frames.
     """
     some = slice(None, None, max(1, len(guess.points) // 100))

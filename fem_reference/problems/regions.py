@@ -116,4 +116,4 @@ def _check_whole(kind: str, laws: list[Energy], at: State, points: Floats) -> No
         named, worst = ", ".join(law.title for law in laws), int(off.argmax())
         got = f"{kind} laws ({named}) with a share of {total[worst]:.3g} at {place_of(points[worst])}"
         want = "1 everywhere" if kind == "pressure" else f"at least {_LEAST:g} everywhere"
-        raise InputError("effects", got, f'{want}: a law without "in", or one in "{REST}NAME" beside one in "NAME"')
+        raise InputError("effects", got, f'{want}: a law without "in", or one in "NAME" and one in "{REST}NAME"')

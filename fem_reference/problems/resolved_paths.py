@@ -22,7 +22,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.motion import Turning, apply
 
-# The greatest rotation [rad] in a load step and between samples, and the greatest travel between samples over the body's size.
+# The greatest rotation [rad] in a load step and between samples, and the greatest travel between samples in sizes of the body.
 TURN, _SAMPLED, _STRIDE = np.pi / 2, np.pi / 16, 0.5
 # A quarter of a circle is 1.11 times as long as its chord. A path counts as returning if it is longer than ``_BENT`` chords and
 # exceeds the chord by ``_BACK`` times the body's size.

@@ -267,7 +267,7 @@ def ventricle_quarter(counts: Counts, kind: Kind, degree: int) -> Cells:
 
 
 def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degree: int) -> Cells:
-    """The octant x, y, z >= 0 of a ball of radius ``outer`` [mm].
+    """The octant x, y, z >= 0 of a solid sphere of radius ``outer`` [mm].
 
     It has a cube with ``n`` cells along each side, of length ``core`` [mm], at its centre, and around it ``layers`` of cells that
     grow evenly from the cube to the sphere. Faces: outer, x0, y0, z0.

@@ -29,8 +29,8 @@ _SMALLEST = 0.05  # the least det F of sampled tetrahedra: curved tetrahedra may
 
 
 def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float = 0.0) -> Floats:
-    """``dW/dF`` (count, 3, 3) [MPa] at a ``state`` whose F consists of jets. W is the sum of the energies per rest volume of the
-    effects ``acting``, pairs (effect, amount), and of a stress ``at_rest``.
+    """``dW/dF`` (count, 3, 3) [MPa] at a ``state`` whose F consists of jets. W is the sum of the energies per unit rest volume of
+    the effects ``acting``, pairs (effect, amount), and of a stress ``at_rest``.
     """
     energy = total_energy(acting, state) + at_rest
     slope = energy.slope if isinstance(energy, Jet) else np.zeros((9, 1))

@@ -26,7 +26,7 @@ def check(body: Body) -> None:
     """Raise InputError if a tendon is combined with tension at rest."""
     if in_situ.among(body.effects) is not None and any(entry.anchor is not None for entry in body.prescribed):
         raise InputError(
-            "effects", "a tendon beside in_situ", "only one of these: the tension of a tendon at rest is unknown"
+            "effects", "a tendon together with in_situ", "only one of these: the tension of a tendon at rest is unknown"
         )
 
 

@@ -15,11 +15,11 @@ from fem_reference.io.texts import finite, plain
 from fem_reference.report.drawings import Drawing, colour_of, drawn
 from fem_reference.report.pages import Page
 
-COMMON = (0.0, 57.0)  # flexion of the hip [deg] that every case completes
+COMMON = (0.0, 57.0)  # hip flexion [deg] that every case completes
 GRADES = {
     "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract; no part of the "
-    "model is from memory",
-    "indicative": "within the uncertainty of every measurement, but each is from one specimen, a quotation, a fit or memory",
+    "model is recalled",
+    "indicative": "within the uncertainty of every measurement, but each is from one specimen, quoted, fitted or recalled",
     "outside": "the model differs from a measurement of muscle by more than its uncertainty, or a measured moment arm is not "
     "within the range of the fibres in all poses",
     "verified only": "the equations are solved correctly; no measurement of muscle is compared with it",
@@ -67,7 +67,7 @@ def met(values: Mapping[str, float], one: Beside) -> bool | None:
 
 def differences(row: Row, arms: Iterable[ArmsBeside]) -> str:
     """The number of measured values that the model misses on either side, and the distances. For moment arms they are means over
-    the poses of each case in mm, otherwise they are in units of the measurement's uncertainty. Wrong orders are counted separately.
+    the poses of each case in mm, otherwise they are in units of the measurement's uncertainty. Wrong rankings count separately.
     """
     own = [one for one in row.beside if one.kind == "measurement"]
     orders, numbers = ([one for one in own if one.is_order is kind] for kind in (True, False))
@@ -82,7 +82,7 @@ def differences(row: Row, arms: Iterable[ArmsBeside]) -> str:
     if lost := sum(map(math.isnan, missed)):
         said.append(f"{lost} without a number")
     if orders:
-        said.append(f"{sum(not one.met for one in orders)} of {len(orders)} orders of stiffness wrong")
+        said.append(f"{sum(not one.met for one in orders)} of {len(orders)} stiffness rankings wrong")
     return "; ".join(said)
 
 
@@ -144,7 +144,7 @@ def facts(found: Credibility) -> dict[str, Any]:
 
 
 def _drawing(arms: ArmsBeside) -> Drawing:
-    """The range of the fibres' arms over the angle, with the published curve or range."""
+    """The range of the fibres' moment arms over the angle, with the published curve or range."""
 
     def draw(_: Figure, axes: Axes) -> None:
         at, own, known = arms.found.angles, arms.found, arms.published
@@ -157,10 +157,10 @@ def _drawing(arms: ArmsBeside) -> Drawing:
         else:
             axes.plot(at, known.low, "--", color="#1d1d1f", label="published range")
             axes.plot(at, known.high, "--", color="#1d1d1f")
-        axes.set(xlabel="flexion of the hip, degrees", ylabel=f"moment arm of {arms.sense}, mm")
+        axes.set(xlabel="hip flexion, degrees", ylabel=f"{arms.sense} moment arm, mm")
         axes.legend(fontsize="x-small")
 
-    share = "not known" if math.isnan(arms.share) else f"{100 * arms.share:.0f} %"
+    share = "unknown" if math.isnan(arms.share) else f"{100 * arms.share:.0f} %"
     what = "of poses inside" if arms.is_curve else "of the range covered"
-    title = f"{arms.muscle.replace('_', ' ').capitalize()} beside {arms.experiment}: {share} {what}"
+    title = f"{arms.muscle.replace('_', ' ').capitalize()} and {arms.experiment}: {share} {what}"
     return drawn(f"arms-{arms.case}-{arms.experiment}", title, (4.6, 3.6), draw)

@@ -86,7 +86,7 @@ def _sentence(found: CaseOmissions, ablation: Ablation, one: Omission) -> str:
         "matters": "It matters",
         "hardly": "It hardly matters",
         "does not matter": "It does not matter",
-        "not known": "Whether it matters is not known",
+        "not known": "Whether it matters is unknown",
     }[omissions.verdict(one.changes, found.bars)]
     saved = 1 - ablation.relative(one.seconds)
     time = "" if math.isnan(saved) else f" and {'saves' if saved >= 0 else 'costs'} {percent(abs(saved))} of the time"
@@ -98,7 +98,7 @@ def _most(found: CaseOmissions, one: Omission) -> str:
     in_bars = omissions.in_bars(one.changes, found.bars).items()
     ratios = {name: ratio for name, ratio in in_bars if not math.isnan(ratio)}
     name = max(ratios, key=lambda name: ratios[name]) if ratios else next(iter(one.changes))
-    known = f", known to {number(found.bars[name])} {found.units[name]}," if name in found.bars else ""
+    known = f" (error bar ± {number(found.bars[name])} {found.units[name]})" if name in found.bars else ""
     return f"the {HEADS.get(name, title_of(name))} by {number(one.changes[name])} {found.units[name]}{known}"
 
 
@@ -136,7 +136,7 @@ def drawing(found: CaseOmissions) -> Drawing | None:
 
 
 def _draw(axes: Axes, rows: list[tuple[str, float, float]], floor: float, colour: str, name: str) -> None:
-    """Draw the points of a run at ``floor`` [mm] or above: a smaller change is written beside its point."""
+    """Draw the points of a run at ``floor`` [mm] or above: a smaller change is written next to its point."""
     if rows:
         heights = [max(change, floor) for _, _, change in rows]
         axes.plot([saved for _, saved, _ in rows], heights, "o", color=colour, markersize=5, label=name)
@@ -149,7 +149,7 @@ def _draw(axes: Axes, rows: list[tuple[str, float, float]], floor: float, colour
 def text(found: CaseOmissions) -> str:
     """The omissions of a case as lines of text."""
     known = [f"{HEADS[name]} {number(bar)} {found.units[name]}" for name, bar in found.bars.items()]
-    lines = [f"{found.case}: {'known to: ' + ', '.join(known) if known else 'no error bars: ' + found.unknown}"]
+    lines = [f"{found.case}: {'error bars: ' + ', '.join(known) if known else 'no error bars: ' + found.unknown}"]
     for ablation in found.ablations:
         whole = ablation.whole
         counts = [f"{number(whole.costs[name])} {title_of(name)}" for name in omissions.COUNTS if name in whole.costs]

@@ -50,8 +50,8 @@ def said(found: Estimation) -> str:
     if fits := [one for one in found.fits if one.gaussians == most]:
         sentences.append(
             f"{most} Gaussians deviate from a muscle's surface by "
-            f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms with "
-            f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer numbers"
+            f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms, with numbers fewer by a factor of "
+            f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f}"
         )
     return "; ".join(sentences) or "nothing was measured"
 

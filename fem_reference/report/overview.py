@@ -60,7 +60,7 @@ def _judged(verdict: Verdict) -> str:
     return (
         f"{verdict.word}: {expected.of} {expected.metric} {expected.statistic} at frame "
         f"{verdict.frame} is {verdict.value:.4g} {verdict.unit}, expected {verdict.truth:.4g} within {verdict.within:.4g}"
-        + ("" if verdict.error_bar is None else f", known to {verdict.error_bar:.2g}")
+        + ("" if verdict.error_bar is None else f", error bar ± {verdict.error_bar:.2g}")
     )
 
 

@@ -1,4 +1,4 @@
-"""Pages: their record, their templates, their writing, and their head, a description that the index shows.
+"""Pages: their record, their templates, how they are written, and their head, a description that the index shows.
 
 Only the command that made a page overwrites it.
 """
@@ -40,8 +40,8 @@ Headlines = tuple[tuple[str, str, str], ...]
 class Page:
     """The ``kind`` of a page, its ``title``, and its ``headlines``: name, verdict (may be empty) and sentence of each.
 
-    ``contents`` fill the ``template`` of the page. ``numbers``, if any, are written beside it as JSON, and ``rows`` as CSV, under
-    ``numbers_name`` or else the name of the page.
+    ``contents`` fill the ``template`` of the page. ``numbers``, if any, are written next to the page as JSON, and ``rows`` as CSV,
+    under ``numbers_name`` or else the name of the page.
     """
 
     kind: str
@@ -110,7 +110,7 @@ def read(path: Path) -> PageHead | None:
 
 
 def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]:
-    """The ``name``, with a number if needed, whose page at ``where(name)`` does not exist or was made by the same command; and a
+    """The ``name``, with a number if needed, for which ``where(name)`` has no page or one made by the same command; and a
     line that reports an existing page, else an empty text.
     """
     for i in count(1):
@@ -144,7 +144,7 @@ def by_name(*functions: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
 
 
 def template(name: str) -> jinja2.Template:
-    """The template in the file ``name`` beside this one: its contents are escaped, and an undefined name is an error."""
+    """The template in the file ``name`` next to this one: its contents are escaped, and an undefined name is an error."""
     return _environment().get_template(name)
 
 

@@ -115,7 +115,7 @@ def _reason(one: Expected, unit: str, limit: float) -> list[str]:
     """The bar of the truth, if it is the reason why the nearest setting does not meet the ``limit`` of the error."""
     if one.bar >= limit:
         known = f"{number(one.bar)} {unit}"
-        return [f"the truth itself is known only to {known}: no smaller error can be proven"]
+        return [f"the error bar of the truth is {known}: no smaller error can be proven"]
     if one.error > limit >= one.error - one.bar:
         within = f"{number(limit)} {unit}"
         return [f"without the bar, the error would be within {within}: the bar of the truth is too large to decide"]

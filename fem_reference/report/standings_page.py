@@ -39,6 +39,6 @@ def _line(row: Standing) -> str:
     value, bar = row.worst.get(ERROR), row.bars.get(ERROR)
     parts = [f"{row.case}: {row.group}, {row.name} {row.version}: {row.ended}{' (stale)' if row.stale else ''}"]
     parts += [] if value is None or row.failed else [f"surface rms {value:.3g} mm"]
-    parts += [] if bar is None else [f"surface rms known to {bar:.2g} mm"]
+    parts += [] if bar is None else [f"error bar ± {bar:.2g} mm"]
     parts += [f"{name} {part:.3g} mm" for name, part in row.split.items()]
     return ", ".join(parts)

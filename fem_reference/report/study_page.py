@@ -229,7 +229,7 @@ def text(study: Study) -> str:
         lines.append(f"{case.case}: {there} points of {listed(list(solvers(case.points)))}; the truth is {case.truth}")
         lines += [f"  {sentence}" for sentence in answer_texts(answered(case), case.units[MAIN])]
         for error in shown(case):
-            known = f", known to {number(case.bars[error])} {case.units[error]}" if error in case.bars else ""
+            known = f", error bar ± {number(case.bars[error])} {case.units[error]}" if error in case.bars else ""
             lines.append(f"  {title_of(error)}{known}:")
             lines += [f"    {sentence}" for sentence in sentences(case, error)]
         lines += [f"  {warning}" for warning in [load_of(case.points)] if warning]

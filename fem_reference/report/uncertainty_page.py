@@ -38,7 +38,7 @@ def page(found: Uncertainty) -> Page:
 
 
 def sentences(found: Uncertainty) -> list[str]:
-    """The result in sentences: the band of the surface, the bar of the reference, the main cause, and each candidate's verdict."""
+    """The result in sentences: the band of the surface, the bar of the reference, the main source, and each candidate's verdict."""
     if found.refused:
         return [f"No band: {found.refused}."]
     said = [_sentence(found, band) for band in found.bands[:1] if not band.refused]
@@ -63,10 +63,10 @@ def sentences(found: Uncertainty) -> list[str]:
 
 def _sentence(found: Uncertainty, band: Band) -> str:
     bar = band.greatest_bar
-    known = "" if math.isnan(bar) else f", where the reference itself is known to {number(bar)} {band.unit}"
+    known = "" if math.isnan(bar) else f", where the error bar of the reference is ± {number(bar)} {band.unit}"
     most = max(band.total, key=lambda key: band.total[key], default="")
     cause = {one.key: one.title for one in found.parameters}.get(most, "")
-    why = f" Its main cause is {cause} ({100 * band.total[most]:.0f} % of the variance)." if cause else ""
+    why = f" Its main source is {cause} ({100 * band.total[most]:.0f} % of the variance)." if cause else ""
     return (
         f"In each frame, in 95 of 100 cases with other parameters in their ranges, the surface is within {number(band.width)} "
         f"{band.unit} of this case's, rms{known}.{why}"
@@ -74,7 +74,7 @@ def _sentence(found: Uncertainty, band: Band) -> str:
 
 
 def ratio_of(band: Band) -> float | None:
-    """The width of a band over the error bar of the reference, None if one is not known."""
+    """The ratio of the width of a band to the error bar of the reference, None if either is unknown."""
     bar = band.greatest_bar
     return band.width / bar if bar > 0 and not math.isnan(band.width) else None
 

@@ -34,7 +34,7 @@ NEAR = 0.2  # distance [mm] within which a vertex touches a bone
 _LEVELS = 127
 # For each quantity, the statistic of the surface's deviation that is its maximum.
 _BARS = {"distance": "max", "surface": "hausdorff"}
-_FAR = 1e6  # distance [mm] beyond which a fibre counts as not known
+_FAR = 1e6  # distance [mm] beyond which a fibre is taken to be unknown
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,7 +61,7 @@ def under_load(shares: Iterable[float], most: float) -> str:
 
 
 def ratio(one: float | None, other: float | None) -> float | None:
-    """The ratio of two times, None if one of them is not known or zero.
+    """The ratio of two times, None if either is unknown or zero.
 
     >>> ratio(100.0, 0.5), ratio(None, 1.0)
     (200.0, None)

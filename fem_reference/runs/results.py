@@ -100,8 +100,8 @@ class Results:
         return {name: np.concatenate([part[name] for part in parts]) for name in wanted}
 
     def energies(self, frame: float) -> dict[str, float]:
-        """The energy [N mm] of each effect that has one, by its name in scene files, at one of the frame numbers ``frames``. An
-        effect's share of a moment is minus the slope of its energy in the angle. Contact and springs are left out.
+        """The energy W [N mm] of each effect that has one, by its name in scene files, at one of the frame numbers ``frames``. An
+        effect's share of a moment is -dW/dtheta, theta the angle of the joint. Contact and springs are left out.
         """
         state, (rule, shares), found = self._state(frame), _rule(), dict[str, float]()
         acting = [(effect, effect.amount(frame)) for effect in self.effects]
@@ -209,7 +209,7 @@ class _Places:
         return {name: values[name] for name in names}
 
     def cauchy_stress(self, acting: Sequence[tuple[Effect, float]]) -> Floats:
-        """``sigma = 1/J dW/dF F^T`` (n, 3, 3) [MPa], with W the sum of the energies per rest volume at the pressure unknown
+        """``sigma = 1/J dW/dF F^T`` (n, 3, 3) [MPa], with W the sum of the energies per unit rest volume at the pressure unknown
         (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.10 and 3.8).
         """
         with np.errstate(all="ignore"):  # where det F is not positive
@@ -221,7 +221,7 @@ class _Places:
         return np.asarray(stress)
 
     def energies(self, acting: Sequence[tuple[Effect, float]]) -> Iterator[tuple[str, Floats]]:
-        """The name of each effect with an energy, and its energy per rest volume (n,) [MPa]."""
+        """The name of each effect with an energy, and its energy per unit rest volume (n,) [MPa]."""
         with np.errstate(all="ignore"):  # where det F is not positive
             now = elastic_state(acting, self._state([list(row) for row in np.moveaxis(self.F, 0, -1)], NUMPY))
             for effect, amount in acting:
@@ -232,7 +232,7 @@ class _Places:
                 yield "in_situ", self._at_rest(whole)
 
     def _at_rest(self, state: State) -> Any:
-        """The energy per rest volume (n,) [MPa] of the stress at rest of a body in situ at ``state``; 0 for any other body."""
+        """The energy per unit rest volume (n,) [MPa] of the stress at rest of a body in situ at ``state``; 0 for any other body."""
         if not len(self.state.response):
             return 0.0
         slopes = self._moved(self.state.response)[1] - np.eye(3)

@@ -147,7 +147,7 @@ class Run:
         return self.values[:, : len(self.points)]
 
     def force(self, bone: str) -> Floats:
-        """The force (f, 3) [N] of the muscle on a ``bone``, by attachments and contact; InputError if it is not known."""
+        """The force (f, 3) [N] of the muscle on a ``bone``, by attachments and contact; InputError if it is unknown."""
         return scalar_vectors(self.scalars, "force_on_", bone)
 
     def moment(self, bone: str, centre: ArrayLike = (0.0, 0.0, 0.0)) -> Floats:

@@ -37,7 +37,7 @@ def stress_scalars(results: Results, frame: float) -> dict[str, float]:
 
 
 def volume_ratio(mesh: TetMesh, state: NodalState) -> float:
-    """The volume of a mesh in a ``state`` over its volume at rest; exact, as det F of a quadratic displacement is of degree 3."""
+    """The volume of a mesh in a ``state``, relative to rest; exact, as det F of a quadratic displacement is of degree 3."""
     tets, count = np.arange(len(mesh.tets)), len(_CUBIC)
     places = np.repeat(tets, count), np.tile(_CUBIC, (len(tets), 1))
     found = Results(mesh, (), {0: state}).evaluate_in(*places, 0, ("det_F",))["det_F"]

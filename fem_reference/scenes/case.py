@@ -34,7 +34,7 @@ Part = Literal["surface", "lines", "field"]
 
 
 def home(package: Path) -> Path:
-    """The folder of cases/ and meshes/: inside an installed package, beside it in a checkout."""
+    """The folder of cases/ and meshes/: inside an installed package, next to it in a checkout."""
     return package if (package / "cases").is_dir() else package.parent
 
 
@@ -197,7 +197,7 @@ class Case(Record):
 
     @property
     def decides(self) -> list[Any]:
-        """Everything that affects verdicts: the causes of solutions, and the judged solvers with settings that change results."""
+        """Everything that affects verdicts: what determines solutions, and the judged solvers with settings that change results."""
         judged = {entry.of for entry in self.expect}
         others = [one for one in self.candidate if judged & {one.name, "candidates"}]
         solved = [

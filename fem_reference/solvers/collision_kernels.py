@@ -4,7 +4,7 @@ The distance to a bone is computed only for vertices that may be near the bone. 
 vertex whose displacement relative to the bone is less than its last distance is still outside. Only vertices are checked, at their
 new positions and not on the path: a sharp edge may pass between them, and a vertex that goes through a thin bone in one step comes
 out on the other side. The distance to a bone of triangles is stored on a grid along the axes at rest, so results depend on the
-axes: if the entire scene is rotated, vertices in the case hip_flexion by ``pbd`` differ by up to 1.2 mm (mean 0.1 mm).
+axes: if the entire scene is rotated, vertices in the case hip_flexion with ``pbd`` differ by up to 1.2 mm (mean 0.1 mm).
 """
 
 import math

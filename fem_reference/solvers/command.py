@@ -45,7 +45,7 @@ Value = int | float | str
 class CommandSettings(Record):
     """The command line, with a value for each setting that it contains.
 
-    ``unit``: the unit of length of the frames, by default the unit in a ``candidate.toml`` beside them, otherwise mm. ``version``:
+    ``unit``: the unit of length of the frames, by default the unit in a ``candidate.toml`` next to them, otherwise mm. ``version``:
     the version of the program. ``files``: files and folders that determine the results, in addition to those named in the command.
     ``moves``: the mesh whose points the program moves. ``time_limit``: the limit on processor time. ``directory``: the working
     directory. ``ladder``: useful values of settings, from the fastest to the most accurate.
@@ -104,7 +104,7 @@ def _filled(settings: CommandSettings, places: Mapping[str, Path]) -> list[str]:
 
 
 class Description(recorded.About):
-    """The contents of ``candidate.toml`` beside a program. ``law``: the effect that is its material, on linear tetrahedra with a
+    """The contents of ``candidate.toml`` next to a program. ``law``: the effect that is its material, on linear tetrahedra with a
     Poisson's ratio of at most its setting ``poisson``; ``takes``: further effects that it models.
     """
 
@@ -119,7 +119,7 @@ class Description(recorded.About):
 
 def choice(command: str, directory: Path, place: str) -> Candidate:
     """The ``command``, which runs in a ``directory``, as a candidate; ``place`` names it in messages. Its description is the
-    ``candidate.toml`` beside the first of its files that has one, else the file in the directory.
+    ``candidate.toml`` next to the first of its files that has one, else the file in the directory.
     """
     names = placeholders(command, place)
     _check_program(command, directory, place)

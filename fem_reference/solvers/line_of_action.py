@@ -82,7 +82,7 @@ class Shortest:
             self.found = Frame(number, None, fibres=points, scalars=scalars)
 
     def _forces(self, passed: Passed, paths: Paths | Winding) -> dict[str, float]:
-        """Force [N] of lines, mean length of fibres over the optimal one, forces on bones."""
+        """Force [N] of lines, mean fibre length divided by the optimal length, forces on bones."""
         if self.hill is None:
             return {}
         pairs = zip(self.muscles, _lengths(passed, paths).tolist(), strict=True)

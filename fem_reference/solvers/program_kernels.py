@@ -17,7 +17,7 @@ from fem_reference.solvers.pbd_kernels import Vector, at, cross, dot, minus, mov
 FLAT_COSINE = 1 - 1e-10
 # A fold is corrected only if the ratio of the correction to its gradient is in this range.
 SMALLEST_RATIO, GREATEST_RATIO = 0.1, 10.0
-# The squares of the gradients of a fold count as at least this [1/mm2].
+# The squares of the gradients of a fold are taken to be at least this [1/mm2].
 SMALLEST_WEIGHT = 1e-4
 # The diagonal of a voxel as the program computes it, in voxels.
 DIAGONAL = math.sqrt(3) + 1e-3

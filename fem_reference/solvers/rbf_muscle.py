@@ -3,9 +3,9 @@
 The surface at rest is fitted by Gaussians with four parameters each (``geometry.gaussian_surface``). At each frame number
 
 - the centres, and a few points of each attachment that move with its bone, move as rigidly as possible relative to their neighbours
-(eq. 5.10 on a graph of tens of nodes); - centres are pushed away from bones that the surface has entered, and vertices that are
-still inside are moved out; - each radius shrinks by the square root of the stretch along the muscle around its centre, as stretched
-fibres become thin; all
+  (eq. 5.10 on a graph of tens of nodes);
+- centres are pushed away from bones that the surface has entered, and vertices that are still inside are moved out;
+- each radius shrinks by the square root of the stretch along the muscle around its centre, as stretched fibres become thin; all
   radii are scaled together until the enclosed volume is the rest volume.
 
 A vertex moves with the Gaussians that form the surface around it, and is then moved to the level of the implicit function that it

@@ -29,9 +29,9 @@ log = logging.getLogger(__name__)
 # Greatest distance [mm] (rms) of the first frame from the rest surface without a warning: above the rounding of any format.
 AT_REST = 0.1
 # Greatest allowed distance, in diagonals of the rest surface's bounding box: above the change by solvers in their first frame,
-# below the change by a wrong unit (at a tenth of the size, points are at least 0.9 rms radii away, 0.26 diagonals for a ball).
+# below the change by a wrong unit (at a tenth of the size, points are at least 0.9 rms radii away, 0.26 diagonals for a sphere).
 NEAR_REST = 0.05
-# Least size of a frame over the size at rest: no solver shrinks a body below it, but a frame in m has 1/1000 of the size in mm.
+# The least size of a frame, relative to rest: no solver shrinks a body below it, but a frame in m has 1/1000 of the size in mm.
 SMALLEST = 1 / 50
 # Greatest distance [mm] between corners of an STL file that count as one vertex: three times the spacing of float32 at 500 mm.
 SAME_POINT = 1e-4
@@ -39,7 +39,7 @@ SAME_POINT = 1e-4
 ON_FRAME = 1e-3
 
 _INDICES = (".pvd", ".xdmf")
-# The file beside the frames that describes a sequence.
+# The file next to the frames that describes a sequence.
 ABOUT = "candidate.toml"
 
 

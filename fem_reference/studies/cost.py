@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 # The metrics of every point of the study; the joint moment only if a solver has forces.
 METRICS = (*in_tables(), "joint_moment")
-# Surface solvers also run on 4**power times as many triangles; these surfaces are stored beside the runs.
+# Surface solvers also run on 4**power times as many triangles; these surfaces are stored with the runs.
 _POWERS = (-1, 1)
 _MOST_TRIANGLES = 20_000  # with more triangles a run takes minutes, most of a study's time
 SURFACES = "surfaces"

@@ -41,7 +41,7 @@ def shipped_law() -> Fitted:
 
 
 def collagen_law(most: int = _MOST) -> Fitted:
-    """The law with collagen across the fibres, fitted to all quantities except orders, which have no slope, in at most ``most``
+    """The law with collagen across the fibres, fitted to all quantities except rankings, which have no slope, in at most ``most``
     evaluations. Only the fibres have a published range: we know no publication with ``k1`` and ``k2`` of this law.
     """
     to = [one for one in QUANTITIES if not one.is_order]

@@ -168,8 +168,8 @@ def of_decompositions(case: MuscleCase, rest: Setup) -> Iterator[DecompositionEr
 
 
 def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
-    """The reference's answer on a case with each source of fibres, beside its answer with the Laplace field and its error bars.
-    Fibre lengths are those of the lines of the Laplace field, carried by each surface.
+    """The reference's answer on a case with each source of fibres, together with its answer with the Laplace field and its error
+    bars. Fibre lengths are those of the lines of the Laplace field, carried by each surface.
     """
     # Without candidates, which other fibres may not suit.
     alone = case.model_copy(update={"candidate": ()})

@@ -79,7 +79,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def bars_kept(folder: Path) -> Iterator[None]:
-    """A context that keeps the error bars beside a run if the same packages solve it again for its states."""
+    """A context that keeps the error bars of a run if the same packages solve it again for its states."""
     before = store.finished(folder)
     same = before is not None and before.origin.get("versions") == versions()
     bars = {path: path.read_text(encoding="utf-8") for path in folder.rglob(error_bars.FILE)} if same else {}

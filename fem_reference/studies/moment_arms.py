@@ -19,7 +19,7 @@ from fem_reference.scenes.muscle import Keyframe, MuscleCase
 from fem_reference.studies.campaign import each
 from fem_reference.studies.execution import Bench
 
-LARGER = 1.25  # factor on the size of tetrahedra in a second run, which shows how far the arms depend on it
+LARGER = 1.25  # factor on the size of tetrahedra in a second run, which shows how far moment arms depend on it
 _EVERY, _RAD = 10, 100  # frame numbers from one frame to the next, and for a turn of a bone by 1 rad
 NEMETH, BLEMKER = "nemeth_1985", "blemker_delp_2005"
 # Flexion [rad]: that of the shipped cases, and from -10 to 90 degrees, or as far as a reference converges.
@@ -30,7 +30,7 @@ _FARTHEST = 1.0  # the flexion [rad] that a run must reach
 @dataclass(frozen=True)
 class ArmStudy:
     """A ``case``, the size of its tetrahedra [mm], the least and greatest ``flexion`` [rad], the name of its ``muscle`` in
-    published files, the ``sense`` of positive arms, and the ``experiments`` with which they are compared.
+    published files, the ``sense`` of positive moment arms, and the ``experiments`` with which they are compared.
     """
 
     case: str
@@ -51,13 +51,13 @@ STUDIES = (
 
 
 def beside(store: Path) -> tuple[tuple[ArmsBeside, ...], dict[str, str]]:
-    """The arms of each wanted muscle compared with each experiment, and the reason by case if they are missing."""
+    """The moment arms of each wanted muscle compared with each experiment, and the reason by case if they are missing."""
     found, missing = each({one.case: one for one in STUDIES}, lambda one: list(of_case(one, store)))
     return tuple(one for several in found.values() for one in several), missing
 
 
 def of_case(wanted: ArmStudy, store: Path) -> Iterator[ArmsBeside]:
-    """The arms of a case compared with each of its experiments, as far as its run went; InputError if it did not reach 1 rad."""
+    """The moment arms of a case compared with each of its experiments, as far as its run went; InputError if below 1 rad."""
     scene = casefile.read_muscle(wanted.case)
     (angles, arms), (others, larger) = (_arms(wanted, size * wanted.tet_size, store) for size in (1.0, LARGER))
     common = min(len(angles), len(others))  # both runs begin at the same angle
@@ -76,7 +76,7 @@ def of_case(wanted: ArmStudy, store: Path) -> Iterator[ArmsBeside]:
 
 
 def _arms(wanted: ArmStudy, tet_size: float, store: Path) -> tuple[Floats, Floats]:
-    """Angles (a,) [deg] and arms (a, k) [mm], positive in the wanted sense, on tetrahedra of ``tet_size`` [mm]."""
+    """Angles (a,) [deg] and moment arms (a, k) [mm], positive in the wanted sense, on tetrahedra of ``tet_size`` [mm]."""
     bench = Bench(coarse(casefile.read_muscle(wanted.case), tet_size, wanted.flexion), store)
     run = bench.reference()
     if run.outcome.status == "denied" or run.numbers[-1] / _RAD + 2 * wanted.flexion[0] < _FARTHEST:
@@ -103,7 +103,7 @@ def coarse(scene: MuscleCase, tet_size: float, flexion: tuple[float, float]) -> 
 
 
 def flexion_arms(run: Run, bench: Bench[MuscleCase]) -> tuple[Floats, Floats]:
-    """Angles of flexion (a,) [deg], opposite to the joint's angle about the axis to the left, and arms of flexion (a, k) [mm]."""
+    """Flexion angles (a,) [deg], opposite to the joint's angle about the axis to the left, and flexion moment arms (a, k) [mm]."""
     context = context_of(bench.setup(), run)
     if len(context.joints) != 1:
         raise InputError(bench.scene.name, f"{len(context.joints)} joints", "one joint")
@@ -131,7 +131,7 @@ def published(scene: MuscleCase, experiment: str, muscle: str) -> ArmRange:
 
 
 def _envelope(rows: list[dict[str, str]], muscle: str) -> ArmRange:
-    """The range [mm] of arms from a file in cm, at the angles of either bound that lie within those of both."""
+    """The range [mm] of moment arms from a file in cm, at the angles of either bound that lie within those of both."""
     sides = {}
     for bound in ("lower", "upper"):
         side = [row for row in rows if (row["muscle"], row["bound"]) == (muscle, bound)]

@@ -1,4 +1,4 @@
-"""Error bars of several muscles solved together: in each further solution, one cause of error is smaller in all muscles."""
+"""Error bars of several muscles solved together: in each further solution, one source of error is smaller in all muscles."""
 
 import logging
 from collections.abc import Iterable
@@ -35,7 +35,7 @@ def coarser(case: MusclesCase) -> tuple[MusclesCase, float]:
 
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> dict[str, ErrorBars]:
-    """The error bars of each muscle by name, from stored or new runs of all muscles; they are stored beside the ``reference``.
+    """The error bars of each muscle by name, from stored or new runs of all muscles; they are stored with the ``reference``.
     With ``model``, also the change by exact attachments. Empty for a run that did not converge.
     """
     if reference.outcome.status != "converged":
@@ -83,7 +83,7 @@ def bars(bench: Bench[Case], reference: Run, name: str) -> ErrorBars | None:
 
 
 def stored(bench: Bench[Case], reference: Run) -> dict[str, ErrorBars]:
-    """The error bars of each muscle that are stored beside a reference; empty if those of any muscle are missing."""
+    """The error bars of each muscle that are stored with a reference; empty if those of any muscle are missing."""
     found = {name: refinement.stored(reference, name) for name in bench.parts}
     known = {name: one for name, one in found.items() if one is not None}
     return known if len(known) == len(found) else {}

@@ -50,7 +50,7 @@ class _Attached:
 
 
 def copied(case: str, folder: Path) -> None:
-    """Copy a case, with the files beside it, into a new ``folder``."""
+    """Copy a case, with the files next to it, into a new ``folder``."""
     scene = casefile.read(case)
     shutil.copytree(scene.folder, _new(folder))
 

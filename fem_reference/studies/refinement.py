@@ -1,4 +1,4 @@
-"""Runs for error bars: on coarser tetrahedra, and on these with one other cause of numerical error halved at a time."""
+"""Runs for error bars: on coarser tetrahedra, and on these with one other source of numerical error halved at a time."""
 
 import hashlib
 import logging
@@ -51,7 +51,7 @@ MAKING = (*map(Path, _OF_BARS), *map(Path(__file__).with_name, ("muscle_bars.py"
 # The coarse run of a scene with refined tetrahedra omits the last refinement; that of any other scene has its own mesh, with
 # tetrahedra larger by this factor.
 RATIO = 1.5
-# Without a request, error bars are computed only if they take at most this share of the reference's time, by tetrahedra.
+# Without a request, error bars are computed only if they take at most this share of the reference's time, as estimated.
 CHEAP = 0.2
 
 # A quadratic element has as many unknowns on the same cells as a linear one on cells of half the size, and does not lock.
@@ -63,7 +63,7 @@ type Vary[C] = Callable[[C], C]
 def variations[C: DrivenCase](
     case: C, settings: Record, *, pressed: bool = True, touched: bool = True
 ) -> dict[str, Vary[C]]:
-    """Changes, by name, each of which halves a cause of numerical error other than tetrahedra: compliance and smoothing of contact
+    """Changes, by name, each of which halves a source of numerical error other than tetrahedra: compliance and smoothing of contact
     with bones, if any ``pressed``, and of muscles with themselves or each other, if any ``touched``; error and rounding of
     distances to bones; load steps, if the ``settings`` have them and a state depends on them: with drag, viscosity or friction.
     """
@@ -92,7 +92,7 @@ def half_steps[C: DrivenCase](case: C, settings: Record) -> Vary[C]:
 
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars | None:
-    """The error bars of the ``reference`` of a bench, from runs in the store or solved now; they are stored beside the reference.
+    """The error bars of the ``reference`` of a bench, from runs in the store or solved now; they are stored with the reference.
     With ``model``, also the change by exact attachments. None for a run that did not converge or has no interior.
     """
     if reference.outcome.status != "converged" or reference.fibres is None or not reference.has_surface:
@@ -117,7 +117,7 @@ def made(pair: Pair, bench: Bench[MuscleCase], folder: Path | None, reference: R
 
 
 def bars(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars | None:
-    """The error bars that are stored beside a reference, else those that :func:`obtain` makes."""
+    """The error bars that are stored with a reference, else those that :func:`obtain` makes."""
     return stored(reference) or obtain(bench, reference, model=model)
 
 
@@ -138,7 +138,7 @@ def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | N
 
 
 def stored(reference: Run, muscle: str = "") -> ErrorBars | None:
-    """The error bars stored beside a reference run, of one ``muscle`` of several; None without bars of this run and metrics."""
+    """The error bars stored with a reference run, of one ``muscle`` of several; None without bars of this run and metrics."""
     if reference.folder is None:
         return None
     folder = reference.folder / muscle
@@ -157,7 +157,7 @@ def needed[C: DrivenCase](bench: Bench[C], reference: Run) -> dict[str, Vary[C]]
 
 
 def finer[C: DrivenCase](bench: Bench[C], reference: Run, ratio: float) -> C:
-    """The scene of a bench on tetrahedra of ``ratio`` times the size, with every other cause of error in its bars halved."""
+    """The scene of a bench on tetrahedra of ``ratio`` times the size, with every other source of error in its bars halved."""
     scene = on_larger(bench.scene, ratio)
     for vary in needed(bench, reference).values():
         scene = vary(scene)
@@ -178,7 +178,7 @@ def solutions[C: DrivenCase](
     bench: Bench[C], reference: Run, larger: dict[str, C], ratio: float, *, model: bool
 ) -> dict[str, tuple[Bench[C], Run]]:
     """Benches and runs, by name: of the scene on ``larger`` tetrahedra, of ``ratio`` times the size; of this scene with each other
-    cause of error halved; and, with ``model``, of this scene with exact attachments, NaN if it cannot be set up.
+    source of error halved; and, with ``model``, of this scene with exact attachments, NaN if it cannot be set up.
     """
     ((first, base),) = larger.items()
     scenes = larger | {name: vary(base) for name, vary in needed(bench, reference).items()}
@@ -208,8 +208,8 @@ def check_coarser(bench: Bench[MuscleCase], fine: float, coarse: float) -> None:
 
 
 def safety(bench: Bench[MuscleCase]) -> float:
-    """The factor of safety: that of a grid convergence index, times the size of the unrefined tetrahedra over the radius of the
-    smallest attachment if that ratio is above 1. Nested tetrahedra share the polygonal outline of an attachment, so their
+    """The factor of safety: that of a grid convergence index, times the ratio of the size of the unrefined tetrahedra to the radius
+    of the smallest attachment if it is above 1. Nested tetrahedra share the polygonal outline of an attachment, so their
     difference does not show its error.
     """
     rest, radii = bench.setup(), [math.inf]
@@ -277,7 +277,7 @@ def body_bars(solved: Run) -> BodyBars | None:
         log.info("error bars: with %s: %s, %s", sharper, found.outcome.status, found.outcome.message)
     states = () if found.outcome.status == "denied" else found.states
     bars = error_bars.body_bars(solved.states, states, shared, sharper)
-    log.info("error bars: displacement is known to %.2g %% at the last frame", 100 * bars.displacement[-1])
+    log.info("error bars: that of the displacement is %.2g %% at the last frame", 100 * bars.displacement[-1])
     return bars
 
 

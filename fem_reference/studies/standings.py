@@ -37,7 +37,7 @@ CASES = (
 TIME_LIMIT = 600.0
 # The entry for the machine if frames were submitted with their time.
 THEIRS = "as stated by its authors"
-# The distance [mm] (rms) up to which the reference counts as back at rest in the last frame; only then are solvers measured there.
+# The distance [mm] (rms) within which the reference must be back at rest in the last frame for solvers to be measured there.
 _BACK = 0.1
 # The metrics of all rows; the joint moment only if a solver has forces.
 _METRICS = (*in_tables(), "joint_moment")
@@ -78,7 +78,7 @@ def submission(folder: Path) -> Entrant:
             raise InputError(f"{place}: {key}", "nothing", "this key in a submission")
     for path in sorted(folder.iterdir()):
         if path.name != recorded.ABOUT and path.name not in said.sha256:
-            raise InputError(f"{place}: sha256", f"no {path.name}", "every file beside it")
+            raise InputError(f"{place}: sha256", f"no {path.name}", "every file next to it")
     candidate = recorded.choice(folder, None, "--submission")
     return Entrant(
         candidate, said.group or table_5_1.FOREIGN, said.version or "", case=said.case or "", scene=said.scene or ""

@@ -115,7 +115,7 @@ def error_bars(
     """Estimate the error of each statistic of a reference, from runs on larger tetrahedra and with finer contact; or that of a
     body, from a solution on smaller cells or with more unknowns in each cell.
 
-    ``reference``: the result of :func:`solve` without a ``solver``, beside whose run bars are stored, or of :func:`solve_body`.
+    ``reference``: the result of :func:`solve` without a ``solver``, with whose run bars are stored, or of :func:`solve_body`.
     ``muscle``: the name of the muscle whose bars are wanted, in a case of several; the runs solve all muscles.
     Each statistic has a bar for each frame, in its unit; a body has bars of points, forces, moments and energy. None if the
     reference did not converge.

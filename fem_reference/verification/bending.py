@@ -122,7 +122,7 @@ def flexure(
     return Entry(
         name=f"flexure_{name}",
         group="flexure",
-        title=f"A block, half as thick as it is long, bent by one radian: {READINGS[reading].words}, by {cells} ({element})",
+        title=f"A block, half as thick as it is long, bent by one radian: {READINGS[reading].words}, with {cells} ({element})",
         unit=READINGS[reading].unit,
         measure=bent,
         given={"reading": reading, "element": element},
@@ -161,7 +161,7 @@ def torsion(
     return Entry(
         name=f"torsion_{name}",
         group="torsion",
-        title=f"A {law} cylinder twisted by half a radian: {words}, by curved {cells} ({given['element']})",
+        title=f"A {law} cylinder twisted by half a radian: {words}, with curved {cells} ({given['element']})",
         unit=unit,
         measure=twisted,
         given={"end": end, "material": material, **given},
@@ -202,7 +202,7 @@ ENTRIES: tuple[Entry, ...] = (
     *(
         SQUARE(
             name=f"torsion_square_bar_{cells}",
-            title=f"A square bar twisted a little, free to warp: its torsional stiffness, by {cells} ({element})",
+            title=f"A square bar twisted a little, free to warp: its torsional stiffness, with {cells} ({element})",
             given={"element": element, "turned": (0, 1)},
             within=within,
             because=f"discretisation error of order 3.7, {left} with 16 cells across; the finite twist adds 1e-6",

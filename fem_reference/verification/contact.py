@@ -1,4 +1,4 @@
-"""Contact between deformable and rigid bodies: a plate on a block, and a ball on a large body (Hertz)."""
+"""Contact between deformable and rigid bodies: a plate on a block, and a sphere on a large body (Hertz)."""
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
@@ -17,7 +17,7 @@ from fem_reference.verification.parts import SLOW, SYMMETRY, clamped, control, f
 
 MU = 0.01  # [MPa]
 PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL = 10.0, 1.0, 0.5  # [MPa], [MPa/mm], [mm]; the cube has sides of 1 mm
-# Radius and approach of the ball [mm], and the bulk modulus of the body [MPa]; the contact radius is 1 mm.
+# Radius and approach of the sphere [mm], and the bulk modulus of the body [MPa]; the contact radius is 1 mm.
 RADIUS, APPROACH, BULK = 10.0, 0.1, 10.0
 BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2  # [MPa/mm]; radii of the body and of its finely meshed core [mm]
 
@@ -28,7 +28,7 @@ def sliding_by(path: float) -> Callable[[float], Floats]:
 
 
 def plate(lab: Lab, element: str, stiffness: float) -> Finding:
-    """The force [N] of a smooth plate that is moved down onto an eighth of a cube of 2 mm."""
+    """The force [N] of a smooth plate that is moved down onto an eighth of a 2 mm cube."""
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
     law = ContactLaw("z1", stiffness, 0.01)
     above = ContactBone("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), sliding_by(-PLATE_TRAVEL))
@@ -38,7 +38,7 @@ def plate(lab: Lab, element: str, stiffness: float) -> Finding:
 
 
 def in_series(bulk: float, stiffness: float, travel: float) -> float:
-    """The force [N] of a block of 1 mm with a ``bulk`` modulus [MPa] in series with a spring of a ``stiffness`` [MPa/mm], whose end
+    """The force [N] of a 1 mm block with a ``bulk`` modulus [MPa] in series with a spring of a ``stiffness`` [MPa/mm], whose end
     is moved down by a ``travel`` [mm]; beyond its smoothing, contact acts as this spring.
     """
     force = partial(find("loads").squeeze_force, MU, bulk, area=1.0)
@@ -50,7 +50,7 @@ def in_series(bulk: float, stiffness: float, travel: float) -> float:
 
 
 def pressed(lab: Lab, n: int, radius: float) -> Frame:
-    """A quarter of a large body, z >= 0, into which a ball of ``radius`` [mm] is pressed by APPROACH."""
+    """A quarter of a large body, z >= 0, into which a sphere of ``radius`` [mm] is pressed by APPROACH."""
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
     law = ContactLaw("z0", BALL_STIFFNESS, 5e-4)
     ball = ContactBone("ball", Sphere((0.0, 0.0, -radius), radius), sliding_by(APPROACH))
@@ -59,7 +59,7 @@ def pressed(lab: Lab, n: int, radius: float) -> Frame:
 
 
 def ball_readings(name: str) -> dict[str, Callable[[Frame], float]]:
-    """Readings of the force ``name`` on a quarter: the force on the whole ball [N], and the contact radius [mm] from its lever
+    """Readings of the force ``name`` on a quarter: the force on the whole sphere [N], and the contact radius [mm] from the moment
     arm, as the resultant of Hertz's pressure on a quarter acts at 3/8 of this radius.
     """
     return {
@@ -68,7 +68,7 @@ def ball_readings(name: str) -> dict[str, Callable[[Frame], float]]:
     }
 
 
-# The readings of a ball, and the greatest pressure [MPa].
+# The readings of a sphere, and the greatest pressure [MPa].
 READINGS: dict[str, Callable[[Frame], float]] = {
     **ball_readings("ball"),
     "peak_pressure": lambda state: float(state.scalars["contact_pressure"]),
@@ -79,14 +79,14 @@ def ball(lab: Lab, reading: str, radius: float) -> Finding:
     """A reading of the pressed body."""
     state = pressed(lab, 4, radius)
     depth = 1000 * state.scalars["contact_depth"]
-    return Finding(READINGS[reading](state), note=f"the ball is {depth:.1f} micrometres deep in the body")
+    return Finding(READINGS[reading](state), note=f"the sphere is {depth:.1f} micrometres deep in the body")
 
 
 YOUNG, POISSON = 9 * BULK * MU / (3 * BULK + MU), (3 * BULK - 2 * MU) / (2 * (3 * BULK + MU))
 
 
 def known_ball(name: str) -> float:
-    """The closed form for a rigid ball on a body with these moduli."""
+    """The closed form for a rigid sphere on a body with these moduli."""
     hertz = find("hertz")
     known = hertz.rigid_sphere(RADIUS, YOUNG, POISSON, hertz.force_at(RADIUS, YOUNG, POISSON, APPROACH))
     return float(getattr(known, name))
@@ -109,7 +109,7 @@ def hertzian(
     because: str,
     readings: Iterable[str],
 ) -> Iterator[Entry]:
-    """The entries of a pressed ball, one for each of the ``readings``, whose words end its ``name`` and ``title``."""
+    """The entries of a pressed sphere, one for each of the ``readings``, whose words end its ``name`` and ``title``."""
     for reading in readings:
         end, words, unit = _SAID[reading]
         yield CONTACT(
@@ -118,7 +118,7 @@ def hertzian(
             unit=unit,
             measure=measure,
             given={"reading": reading, "radius": RADIUS},
-            **control("a ball of twice the radius", radius=2 * RADIUS),
+            **control("a sphere of twice the radius", radius=2 * RADIUS),
             truth=partial(known, reading),
             within=0.02,
             because=because,
@@ -131,7 +131,7 @@ ENTRIES = (
     *(
         CONTACT(
             name=f"plate_{element.lower().replace('/', '_')}",
-            title=f"A smooth plate on a block, by {element}: its force at half the height",
+            title=f"A smooth plate on a block, with {element} elements: its force at half the height",
             unit="N",
             measure=plate,
             given={"element": element, "stiffness": PLATE_STIFFNESS},
@@ -145,7 +145,7 @@ ENTRIES = (
     ),
     *hertzian(
         "hertz_{}",
-        "A rigid ball pressed into a large body: {}",
+        "A rigid sphere pressed into a large body: {}",
         ball,
         known_ball,
         "the discretisation error is 1 to 1.5 %; strains of 0.1, the finite size of the body and the penetration each add less",

@@ -105,7 +105,7 @@ def tip_entry(
     stated = {"refinement": Refinement(counts, HEIGHT, order)} | wrong | more
     return MEMBRANE(
         name=f"cook_{name}",
-        title=f"Cook's membrane {MEMBRANES[panel['name']]}: tip by {words}",
+        title=f"Cook's membrane {MEMBRANES[panel['name']]}: tip with {words}",
         unit="mm",
         measure=tip,
         given={**panel, "element": element},
@@ -139,13 +139,13 @@ ENTRIES: tuple[Entry, ...] = (
         **control("quadratic tetrahedra with a pressure", element="P2/P1"),
         truth=LOCKED / 2,
         within=LOCKED / 2,
-        because="the element counts as locked below half of the displacement: any ratio from 0 to 0.5 passes",
+        because="the element is taken to be locked below half of the displacement: any ratio from 0 to 0.5 passes",
         kind="property",
         source="true displacement of the tip: " + SOURCE,
     ),
     MEMBRANE(
         name="cook_taylor_hood",
-        title="Taylor-Hood tetrahedra do not lock on the mesh on which linear ones lock: tip displacement over its true value",
+        title="Taylor-Hood tetrahedra do not lock on the mesh on which linear ones do: ratio of tip displacement to true value",
         unit="",
         measure=ratio,
         given={**NEARLY, "n": 8, "element": "P2/P1"},

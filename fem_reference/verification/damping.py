@@ -106,7 +106,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     DAMPED(
         name="damped_creep",
-        title="Bar in a frictionless box that creeps back once unloaded: rate of the slowest mode, by load steps that are "
+        title="Bar in a frictionless box that creeps back once unloaded: rate of the slowest mode, with load steps that are "
         "halved",
         unit="1/s",
         measure=bar_creep,
@@ -121,7 +121,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     VISCOUS(
         name="viscous_squeeze",
-        title="Viscous block squeezed to half its height between smooth plates: their force, by load steps that are halved",
+        title="Viscous block squeezed to half its height between smooth plates: their force, with load steps that are halved",
         unit="N",
         measure=force,
         truth=lambda: viscosity.squeeze_force(MU, ETA, 0.5, -0.5 / VISCOUS_SECONDS, 1.0),
@@ -132,7 +132,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     VISCOUS(
         name="viscous_creep",
-        title="Viscous block that creeps back once unloaded: rate, by load steps that are halved",
+        title="Viscous block that creeps back once unloaded: rate, with load steps that are halved",
         unit="1/s",
         measure=block_creep,
         truth=lambda: viscosity.creep_rate(MU, ETA),

@@ -45,7 +45,7 @@ def _control(name: str) -> tuple[str, Material]:
 
 def _entry(quantity: Quantity) -> Entry:
     first = quantity.facts[0]
-    confirmed = "" if first.doi_confirmed == "yes" else " (from memory)"
+    confirmed = "" if first.doi_confirmed == "yes" else " (recalled)"
     return _of(
         quantity,
         (SHIPPED, *_control(quantity.name)),
@@ -78,7 +78,7 @@ def _of(
     )
 
 
-_BOTH = "van_loocke_2006, read in: quotation; takaza_2013, from memory"
+_BOTH = "van_loocke_2006, read in: quotation; takaza_2013, recalled"
 ORDERS = Quantity(
     name="cube_both_orders",
     title="Stiffer along the fibres in compression and across them in tension",

@@ -112,7 +112,7 @@ ENTRIES = (
     ),
     length(
         "active_shortening",
-        "Active fibres free to shorten: length over rest length",
+        "Active fibres free to shorten: ratio of length to rest length",
         free(NEO + active(0.1)),
         "Half the activation.",
         material=NEO + active(0.05),
@@ -151,7 +151,7 @@ ENTRIES = (
     replace(
         length(
             "prestretch_released",
-            "Muscle with a prestretch of 1.2, released: length over that of the mesh, 1 / 1.2",
+            "Muscle with a prestretch of 1.2, released: length divided by that of the mesh, 1 / 1.2",
             free(TAUT),
             "Prestretch 1 % too high.",
             **TAUTER,

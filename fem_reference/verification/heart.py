@@ -109,7 +109,7 @@ FINE = "the discretisation error is 0.2 %"
 ENTRIES: tuple[Entry, ...] = (
     HEART(
         name="beam_follower",
-        title="A beam of heart muscle under a follower pressure: height of its end, by quadratic tetrahedra",
+        title="A beam of heart muscle under a follower pressure: height of its end, with quadratic tetrahedra",
         given={"body": "beam", "point": land.BEAM_POINT, "element": "P2/P1", "degree": 1},
         **control("5 % stiffer", stiff=1.05),
         truth=land.TIP_OF_BEAM,
@@ -120,7 +120,7 @@ ENTRIES: tuple[Entry, ...] = (
     *(
         HEART(
             name=f"ventricle_passive_{where}_{by}",
-            title=f"A ventricle inflated to 10 kPa: height of its apex {where}, by quadratic {by}",
+            title=f"A ventricle inflated to 10 kPa: height of its apex {where}, with quadratic {by}",
             given={"body": "passive", "point": point, "element": element},
             **control("20 % stiffer", stiff=1.2),
             truth=land.PASSIVE_APICES[place],
@@ -133,7 +133,7 @@ ENTRIES: tuple[Entry, ...] = (
     *(
         HEART(
             name=f"ventricle_active_{where}",
-            title=f"A ventricle that contracts at 60 kPa against 15 kPa: height of its apex {where}, by quadratic hexahedra",
+            title=f"A ventricle that contracts at 60 kPa against 15 kPa: height of its apex {where}, with quadratic hexahedra",
             given={"body": "contracting", "point": point, "element": "Q2/Q1"},
             **control("half the active tension", active=0.5),
             truth=land.ACTIVE_APICES[place],

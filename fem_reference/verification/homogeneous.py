@@ -171,7 +171,7 @@ ENTRIES = (
         force_entry(
             GROUP,
             f"{word}_{mode}_{element}".lower().replace("-", "_").replace("/", "_"),
-            f"{word} block {AMOUNTS[mode][1]}, by {element}: force",
+            f"{word} block {AMOUNTS[mode][1]}, with {element}: force",
             Specimen(material, element, mode, AMOUNTS[mode][0]),
             negative_control,
             material=wrong,
@@ -194,7 +194,7 @@ ENTRIES = (
         1,
         GROUP,
         "neo_hookean_thinning_p2",
-        "Compressible neo-Hookean block stretched along one axis, by P2: its lateral stretch",
+        "Compressible neo-Hookean block stretched along one axis, with P2: its lateral stretch",
         Specimen(NEO, "P2", "uniaxial", 1.6, bulk=10 * MU),
         "Bulk modulus 1 % too high.",
         bulk=10.1 * MU,

@@ -65,8 +65,8 @@ def frequency(lab: Lab, steps: int, factor: float) -> float:
 
 
 def departure(lab: Lab, spectral_radius: float) -> Finding:
-    """The greatest change of the total (elastic, kinetic and potential) energy over the greatest kinetic energy, of a block clamped
-    at one side that swings under its own weight, which is applied at once.
+    """The greatest change of the total (elastic, kinetic and potential) energy, divided by the greatest kinetic energy, of a block
+    clamped at one side that swings under its own weight, which is applied at once.
     """
     mesh = shapes.box((4, 1, 1), (4.0, 1.0, 1.0), "tetrahedron")
     acting = (*neo_hooke(MU, 100 * MU), mass(1.0, spectral_radius), weight(2, -6e4))
@@ -96,7 +96,7 @@ def more(lab: Lab, periods: float, factor: float) -> float:
 
 
 def slow(lab: Lab, factor: float) -> Finding:
-    """The inertia force over its limit for slow motion, in pulls each twice as long as the last; its error is of order speed^2."""
+    """The inertia force relative to its slow limit, in pulls each twice as long as the last; its error is of order speed^2."""
     ladder = tuple((1 / periods, more(lab, periods, factor)) for periods in (4.0, 8.0, 16.0))
     acceleration = WAY * float(SMOOTH.deriv(2)(0.25)) / (16.0 * PERIOD) ** 2
     known = inertia.pull_of_inertia(DENSITY, LENGTH, 1.0, acceleration)
@@ -121,7 +121,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     MOVING(
         name="bar_first_frequency",
-        title="Bar with one end fixed: frequency of its first longitudinal mode, by time steps that are halved",
+        title="Bar with one end fixed: frequency of its first longitudinal mode, with time steps that are halved",
         unit="1/s",
         measure=frequency,
         given={"factor": 1.0},
@@ -135,7 +135,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     MOVING(
         name="swing_energy",
-        title="Clamped block that swings ten times under its weight: greatest change of its energy over its greatest kinetic "
+        title="Clamped block that swings ten times under its weight: greatest change of its energy divided by its kinetic "
         "energy",
         unit="",
         measure=departure,

@@ -20,7 +20,7 @@ from fem_reference.problems.paths import radially
 from fem_reference.runs.store import Run
 from fem_reference.verification.parts import SLOW, SYMMETRY, clamped, control, find, mooney_rivlin, neo_hooke, ramp
 
-# [MPa]; C1 and C2 make a Mooney-Rivlin law with the shear modulus MU. Pressures are proportional to the moduli.
+# [MPa]; C1 and C2 give a Mooney-Rivlin law with the shear modulus MU. Pressures are proportional to the moduli.
 MU, BULK = 1.0, 1e4
 C1, C2 = 0.3, 0.2
 NEARLY = 1e6  # [MPa], the bulk modulus if the closed form is for incompressible material
@@ -33,7 +33,7 @@ RESIDUAL = 1e-8  # [N, mm3], at forces of about 100 N
 
 Material = tuple[Effect, ...]
 Pressures = Callable[[float], float]  # the pressure [MPa] at a stretch a / A of the inner face
-# The largest stretch, and the value that is read from the pressures up to it.
+# The largest stretch, and the function that reads a value from the pressures up to this stretch.
 Reading = tuple[float, Callable[[Pressures], float]]
 
 
@@ -51,8 +51,8 @@ def slope(solved: Run) -> Chebyshev:
 
 
 def blown(lab: Lab, n: int, reading: Reading, element: str, material: Material, degree: int = 2) -> float:
-    """A ``reading`` of an octant of the sphere in 3 n^2 by 2 n cells, straight with ``degree`` 1; its inner face, which is
-    moved out, encloses ``pi a^3 / 6``.
+    """A ``reading`` of an octant of the sphere with 3 n^2 by 2 n cells, which are straight if ``degree`` is 1. Its inner face is
+    displaced outwards and encloses ``pi a^3 / 6``.
     """
     largest, read = reading
     grown = Prescribed("inner", "inner", (0, 1, 2), radially(1.0, knots=((1.0, 0.0), (2.0, 1.0), (3.0, 2.0))))
@@ -80,7 +80,7 @@ def pressed(lab: Lab, n: int, mu: float) -> float:
 
 
 def tube(lab: Lab, n: int, element: str, ends: tuple[str, ...] = ("bottom", "top"), degree: int = 2) -> Run:
-    """A quarter of the tube, whose inner face is moved out to STRETCH, and whose ``ends`` stay in their planes."""
+    """A quarter of the tube, whose inner face is displaced outwards to STRETCH, and whose ``ends`` stay in their planes."""
     mesh = shapes.tube_quarter(INNER, OUTER, LENGTH, (2 * n, 2 * n, 1), ELEMENTS[element][0], degree)
     grown = Prescribed("inner", "inner", (0, 1), radially(1.0, (1.0, 1.0, 0.0), ((1.0, 0.0), (2.0, 1.0))))
     fixed = (*SYMMETRY[:2], *clamped(*ends, components=(2,)), grown)
@@ -139,7 +139,7 @@ STRAIGHT = control("straight cells, with flat facets on the surfaces", degree=1)
 OTHER_LAW = "Mooney-Rivlin material with the same shear modulus, whose pressure keeps rising"
 RISING = control(OTHER_LAW, material=MOONEY_RIVLIN)
 INFLATED = partial(Entry, group="inflation", relative=True, kind="closed form")
-FINITE = partial(INFLATED, source="Ogden 1984, ch. 5.3, with the finite bulk modulus; validation/radial.py")
+FINITE = partial(INFLATED, source="Ogden 1984, ch. 5.3, with a finite bulk modulus; validation/radial.py")
 # Pressure at STRETCH [MPa], the largest pressure [MPa] and its stretch, and the fall from there to BEYOND [MPa].
 AT_STRETCH: Reading = (1.6, lambda pressures: pressures(STRETCH))
 LARGEST: Reading = (BEYOND, lambda pressures: pressures(top(pressures)))
@@ -154,7 +154,7 @@ ENTRIES: tuple[Entry, ...] = (
     *(
         FINITE(
             name=f"inflation_sphere_pressure_{cells}",
-            title=f"A thick sphere inflated to 1.5 times its inner radius: its pressure, by curved {cells} ({element})",
+            title=f"A thick sphere inflated to 1.5 times its inner radius: its pressure, with curved {cells} ({element})",
             unit="MPa",
             measure=blown,
             given={"reading": AT_STRETCH, "element": element, "material": NEO_HOOKE},
@@ -185,7 +185,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     FINITE(
         name="inflation_sphere_stretch",
-        title="A thick sphere under a follower pressure inside: the stretch of its inner radius",
+        title="A thick sphere under an internal follower pressure: the stretch of its inner radius",
         unit="1",
         measure=pressed,
         given={"mu": MU},
@@ -197,14 +197,14 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     FINITE(
         name="inflation_membrane",
-        title="A soft sphere lined with a membrane that carries nine tenths of the inner pressure: the stretch of its inner radius",
+        title="A soft sphere lined with a membrane that carries nine tenths of the internal pressure: stretch of its inner radius",
         unit="1",
         measure=sheathed,
         given={"element": "P2/P1", "thickness": THICKNESS},
         **control("the membrane is 1 % too thick", thickness=1.01 * THICKNESS),
         truth=true_sheathed,
         within=2e-4,
-        because="discretisation error of order 4, 8e-5 with 2 cells through the wall (P2/P1), with the membrane on their faces",
+        because="discretisation error of order 4, 8e-5 with 2 cells through the wall (P2/P1), with the membrane on the inner faces",
         source="Membrane: p = 2 sigma h / r, incompressible neo-Hookean (Holzapfel 2000, ch. 6.5; validation/balloon.py)",
         refinement=Refinement((1, 2), INNER / 2, order=4),
     ),
@@ -232,7 +232,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     LIMIT(
         name="inflation_fall_beyond_limit",
-        title="A thick sphere inflated to 2.2 times its inner radius: the drop of its pressure from the largest",
+        title="A thick sphere inflated to 2.2 times its inner radius: the drop in pressure from its maximum",
         unit="MPa",
         given={**CELLS, "reading": FALL},
         **RISING,

@@ -37,7 +37,7 @@ def pressed(pressure: float) -> Effect:
 
 
 def dead(nominal: float) -> Effect:
-    """A force per area at rest along x on the face x1 [MPa]."""
+    """A force per unit rest area along x on the face x1 [MPa]."""
     return make("traction", on="x1", force=f"{nominal}, 0, 0 MPa", ramp=parts.ramp())
 
 
@@ -111,7 +111,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     LOAD(
         name="heavy_column",
-        title="Soft column in a frictionless box that sinks under its own weight, by Q2: displacement of its top",
+        title="Soft column in a frictionless box that sinks under its own weight, with Q2: displacement of its top",
         unit="mm",
         measure=top,
         given={"element": "Q2"},
@@ -126,7 +126,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     LOAD(
         name="pressed_volume",
-        title="Block in a fluid whose pressure is a tenth of the block's bulk modulus: volume over rest volume",
+        title="Block in a fluid whose pressure is a tenth of the block's bulk modulus: ratio of volume to rest volume",
         unit="1",
         measure=shrunk,
         given={"pressure": FLUID},

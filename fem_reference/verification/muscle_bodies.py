@@ -1,7 +1,7 @@
-"""Idealised muscles compared with measured ones: a vastus lateralis with its aponeurosis, and a ball on a tibialis anterior.
+"""Idealised muscles compared with measured ones: a vastus lateralis with its aponeurosis, and a sphere on a tibialis anterior.
 
 The material is the shipped one, chosen from other sources and never fitted to these measurements. Shapes are idealised, and
-their sizes are from memory or assumed, so no entry validates the model. The measurements of the publications are in
+their sizes are recalled or assumed, so no entry validates the model. The measurements of the publications are in
 ``validation/experiments``.
 """
 
@@ -29,15 +29,15 @@ from fem_reference.verification.experiments import EXPERIMENT
 from fem_reference.verification.parts import NO_GRADIENT, SLOW, clamped, control, sliding
 
 ELEMENT = "Q2/Q1"
-# Vastus lateralis: Ward et al. 2009, doi 10.1007/s11999-008-0594-8, and arms of the knee's extensors, all from memory.
+# Vastus lateralis: Ward et al. 2009, doi 10.1007/s11999-008-0594-8, and moment arms of the knee extensors, all recalled.
 FIBRE, OPTIMAL, PENNATION, ARM = 99.4, 2.7, math.radians(18.4), 40.0  # [mm] at a sarcomere length [um], [rad], [mm]
 APONEUROSIS, HALF_WIDTH, THIN = 174.0, 32.5, 1.0  # length, half the width and thickness of the aponeurosis [mm]
 FLEXION = math.radians(110 - 50)
 LENGTH = FIBRE * find("chen_2016", "sarcomere_length", "50 deg").value / OPTIMAL  # of the fibres at 50 degrees [mm]
 ALONG, THICK = LENGTH * math.cos(PENNATION), LENGTH * math.sin(PENNATION)
-# Tendon after Blemker, Pinsky and Delp 2005, from memory: 2.7 MPa (exp(46.4 (stretch - 1)) - 1) to a stretch of 1.03, then linear.
+# Tendon after Blemker, Pinsky and Delp 2005, recalled: 2.7 MPa (exp(46.4 (stretch - 1)) - 1) to a stretch of 1.03, then linear.
 L1, L2, STRAIGHT = 2.7, 46.4, 1.03
-# Tibialis anterior of a rat: half its length and width, thickness, and the ball [mm]; assumed.
+# Tibialis anterior of a rat: half its length and width, thickness, and the radius of the sphere [mm]; assumed.
 TIBIALIS, BALL = (12.0, 5.0, 6.0), 3.0
 MU = 0.01  # shear modulus of the shipped matrix [MPa]
 _MU, _ALPHA = find("bosboom_2001", "ogden_mu", ""), find("bosboom_2001", "ogden_alpha", "")
@@ -54,7 +54,7 @@ class Above:
 
 def vastus(n: int, arm: float) -> Body:
     """Half a planar muscle whose fibres rise from the bone to an aponeurosis. The end of the aponeurosis is pulled by a moment
-    ``arm`` [mm] times the knee's flexion. The aponeurosis slides below a fascia, which keeps the muscle's thickness.
+    arm ``arm`` [mm] times the knee flexion. The aponeurosis slides below a fascia, which keeps the muscle's thickness.
     """
     counts, size = (6 * n, 2 * n, 2 * n), (APONEUROSIS, THICK, HALF_WIDTH)
     rising = Brick(lambda u: u * size + u[:, 1:2] * (ALONG, 0, 0), counts, {"y0": "bone", "z0": "middle"})
@@ -100,7 +100,7 @@ class FittedOgden(Energy):
         return Moduli(shear=self.mu)
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
+        """Energy per unit rest volume [MPa]."""
         first, second = state.J ** (-2 / 3) * state.I1, state.J ** (-4 / 3) * state.I2
         sums = [3.0, first, first**2 - 2 * second]
         for _ in range(self.half - 2):
@@ -109,7 +109,7 @@ class FittedOgden(Energy):
 
 
 def ball_force(lab: Lab, n: int, depth: float, laws: tuple[Effect, ...]) -> float:
-    """The force [N] of a smooth ball that is pressed by a ``depth`` [mm] into a muscle on bone, across its fibres."""
+    """The force [N] of a smooth sphere that is pressed by a ``depth`` [mm] into a muscle on bone, across its fibres."""
 
     def place(u: Floats) -> Floats:
         finer = np.column_stack([u[:, 0] ** 1.4, u[:, 1] ** 1.4, 1 - (1 - u[:, 2]) ** 1.2])
@@ -132,20 +132,20 @@ def ball_force(lab: Lab, n: int, depth: float, laws: tuple[Effect, ...]) -> floa
 
 
 def indentation(lab: Lab, n: int, depth: float, mu: float) -> float:
-    """The force on the shipped material, with the shear modulus ``mu`` [MPa], over that on the fitted law."""
+    """The force on the shipped material, with the shear modulus ``mu`` [MPa], divided by that on the fitted law."""
     shipped = make("neo_hooke", mu=f"{mu} MPa"), make("fibre_passive", **FIBRES)
     fitted = (FittedOgden.model_validate({"mu": f"{_MU.value} kPa"}),)
     return ball_force(lab, n, depth, shipped) / ball_force(lab, n, depth, fitted)
 
 
-# By depth [mm]: half the difference of the forces at the exponents 16 and 28, over the force at 22; the reported deviation is 5.7.
+# By depth [mm]: half the difference of forces at the exponents 16 and 28, divided by the force at 22; reported deviation: 5.7.
 _BY_EXPONENT = {0.6: 0.071, 1.2: 0.271}
 _SARCOMERES = find("chen_2016", "sarcomere_length", "110 deg"), find("chen_2016", "sarcomere_length", "50 deg")
 _STRETCH, _SD = ratio(*_SARCOMERES)
 _FINER = "The finer mesh is solved in twice as many load steps."
 _OTHER_MU = (
     f"The abstract does not define mu. If the shear modulus is mu alpha / 2, {_MU.value * _ALPHA.value / 2:.0f} kPa, the ratio is "
-    f"{_ALPHA.value / 2:.1f} times smaller."
+    f"smaller by a factor of {_ALPHA.value / 2:.1f}."
 )
 
 
@@ -154,8 +154,8 @@ def _indented(name: str, share: str, depth: float, pinned: float) -> Entry:
     spread = (_MU.sd or math.nan) / _MU.value
     return EXPERIMENT(
         name=name,
-        title=f"Ball pressed across the fibres into an idealised tibialis anterior, by a {share} of its thickness: force "
-        "over that of a law fitted to indentations",
+        title=f"Sphere pressed across the fibres into an idealised tibialis anterior, by a {share} of its thickness: force "
+        "divided by that of a law fitted to indentations",
         unit="1",
         measure=indentation,
         given={"depth": depth, "mu": MU},
@@ -164,8 +164,8 @@ def _indented(name: str, share: str, depth: float, pinned: float) -> Entry:
         within=math.hypot(spread, _BY_EXPONENT[depth]),
         because=f"Standard deviations of mu, {100 * spread:.0f} %, and of the exponent, {100 * _BY_EXPONENT[depth]:.0f} % of the "
         "force at this depth, taken as independent.",
-        source="bosboom_2001, read in: abstract; doi 10.1016/S0021-9290(01)00083-5; shape, ball and depth assumed; mu read as the "
-        "shear modulus, from memory",
+        source="bosboom_2001, read in: abstract; doi 10.1016/S0021-9290(01)00083-5; shape, sphere and depth assumed; mu read as "
+        "the shear modulus, recalled",
         refinement=Refinement((1, 2), TIBIALIS[0] / 4, None, note=f"{_FINER} {_OTHER_MU}"),
         pinned=pinned,
         facts=(_MU, _ALPHA),
@@ -185,7 +185,7 @@ ENTRIES = (
         truth=_STRETCH,
         within=_SD,
         because="The standard deviation of the ratio of two mean sarcomere lengths of six people, taken as independent.",
-        source="chen_2016, read in: abstract; doi 10.1016/j.jbiomech.2016.07.013; architecture, arm and tendon from memory",
+        source="chen_2016, read in: abstract; doi 10.1016/j.jbiomech.2016.07.013; architecture, moment arm and tendon recalled",
         refinement=Refinement(
             (1, 2), APONEUROSIS / 6, None, note=f"{_FINER} The tendon beyond the muscle is rigid here."
         ),

@@ -55,7 +55,7 @@ def truth(width: float) -> float:
 ALIGNED = Entry(
     name="series_bar",
     group="regions",
-    title="Bar of two materials in series, one a thousand times as stiff, with an interface on cell faces, by P2: force",
+    title="Bar of two materials in series, one a thousand times as stiff, with an interface on cell faces, with P2: force",
     unit="N",
     measure=force,
     given={"cells": 10, "element": "P2", "width": 0.0},
@@ -73,7 +73,7 @@ ENTRIES = (
     replace(
         ALIGNED,
         name="series_bar_mixed",
-        title="Bar of two materials in series, one a thousand times as stiff, with an interface on cell faces, by P2/P1: force",
+        title="Bar of two materials in series, one a thousand times as stiff, with an interface on cell faces, with P2/P1: force",
         given={"cells": 10, "element": "P2/P1", "width": 0.0},
         within=1e-6,
         because="The exact pressure jumps at the interface; the discrete one is continuous and oscillates in the cells next to it. "
@@ -82,7 +82,7 @@ ENTRIES = (
     replace(
         ALIGNED,
         name="series_bar_transition",
-        title="Bar of two materials in series, one a thousand times as stiff, with a transition of 2 mm, by P2: force",
+        title="Bar of two materials in series, one a thousand times as stiff, with a transition of 2 mm, with P2: force",
         given={"element": "P2", "width": WIDTH},
         **control("No transition.", width=0.0),
         truth=partial(truth, WIDTH),

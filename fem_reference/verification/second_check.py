@@ -30,7 +30,7 @@ def _slides(direction: list[float], distance: str) -> dict[str, object]:
 
 
 def bar(ball: str = "2 mm") -> MuscleProblem:
-    """A bar of 10 x 10 x 40 mm between two bones, one of which moves by 3 mm; a ball of radius 3 mm moves by ``ball`` into it."""
+    """A bar of 10 x 10 x 40 mm between two bones, one of which moves by 3 mm; a sphere of radius 3 mm moves by ``ball`` into it."""
     ball_bone = {"sphere": {"centre": "-3.2, 5, 20 mm", "radius": "3 mm"}, "motion": _slides([1, 0, 0], ball)}
     hold = [{"face": "z0"}, {"face": "z1", "motion": _slides([0, 1, 0], "3 mm")}]
     table = {
@@ -94,7 +94,7 @@ MISTAKES = (
     ("frames", "its last frame missing", missing),
     ("finite", "a coordinate that is not a number", moved(2, CORNER, (0.0, np.nan, 0.0))),
     ("attached", "an attached vertex 0.01 mm off its bone", moved(1, CORNER, (0.01, 0.0, 0.0))),
-    ("bone", "the ball 3 mm deeper in the bar", lambda it, run: (replace(it, bones=bar("5 mm").bones), run)),
+    ("bone", "the sphere 3 mm deeper in the bar", lambda it, run: (replace(it, bones=bar("5 mm").bones), run)),
     ("itself", "a vertex of one side of the bar beyond the other side", moved(1, FAR_SIDE, (-12.0, 0.0, 0.0))),
 )
 
@@ -138,7 +138,7 @@ def _entry(name: str, what: str, words: str, measure: Callable[..., Finding], **
     )
 
 
-BAR = "a bar between two bones, into which a ball is pressed,"
+BAR = "a bar between two bones, into which a sphere is pressed,"
 BLOCKS = "two blocks pressed together"
 ENTRIES = (
     *(_entry(name, BAR, words, denials, mistake=mistake) for name, words, mistake in MISTAKES),

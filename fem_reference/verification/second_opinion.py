@@ -52,8 +52,8 @@ def agreement(
 
 
 def differences(first: Frame, second: Frame, rest: Floats) -> dict[str, float]:
-    """The relative differences between two states of a body: of node positions over the greatest displacement from ``rest`` (n, 3),
-    of energies, and of forces and moments over the greatest of them.
+    """The relative differences between two states of a body: of node positions, relative to the greatest displacement from ``rest``
+    (n, 3), of energies, and of forces and moments over the greatest of them.
     """
     return {
         "positions": parts.farthest(second.points, first.points) / parts.farthest(first.points, rest),
@@ -164,7 +164,7 @@ def opinion(name: str, title: str, body: Callable[[], Body], element: str, toler
     return Entry(
         name=f"second_opinion_{name}",
         group="second opinion",
-        title=f"{title}, by {element}: largest relative difference between FEniCSx and scikit-fem",
+        title=f"{title}, with {element}: largest relative difference between FEniCSx and scikit-fem",
         unit="1",
         measure=agreement,
         given={"body": body, "element": element, "residual": tolerance.residual, "quadrature": tolerance.quadrature},
@@ -200,7 +200,7 @@ EXTENDED = "A block of Mooney-Rivlin material pulled to 1.3 times its length"
 LAGGED = Entry(
     name="lagged_factorisation",
     group="linear solvers",
-    title="Turned bar of muscle by lagged factorisations in double precision and by direct ones: largest difference of a node",
+    title="Turned bar of muscle with lagged factorisations in double precision and direct ones: largest difference of a node",
     unit="mm",
     measure=difference,
     given={"solver": "lagged", "precision": "double"},
@@ -246,14 +246,14 @@ ENTRIES: tuple[Entry, ...] = (
     replace(
         LAGGED,
         name="lagged_factorisation_single",
-        title="Turned bar of muscle by lagged factorisations in single precision and by direct ones in double: largest difference "
+        title="Turned bar of muscle with lagged factorisations in single precision and direct ones in double: largest difference "
         "of a node",
         given={"solver": "lagged", "precision": "single"},
     ),
     replace(
         LAGGED,
         name="multigrid",
-        title="Turned bar of muscle by multigrid between P2 and P1 and by direct factorisations: largest difference of a node",
+        title="Turned bar of muscle with multigrid between P2 and P1 and with direct factorisations: largest difference of a node",
         within=1e-8,
         given={"solver": "multigrid"},
     ),

@@ -24,7 +24,7 @@ from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, clamped, con
 
 loads = find("loads")
 MU = 0.01  # [MPa]
-HEIGHT = 0.1  # of the squeezed block over that at rest; a collapsed block has a thousandth of its rest volume there
+HEIGHT = 0.1  # of the squeezed block, relative to rest; a collapsed block has a thousandth of its rest volume there
 STEPS = 5  # in each direction
 RESIDUAL = 1e-11  # [N, mm3]
 GLUED_TO, GLUED_STEPS = 0.4, 12
@@ -152,7 +152,7 @@ ENTRIES: tuple[Entry, ...] = (
     YES(
         name="collapse_is_no_result",
         group="collapse",
-        title="A block of Poisson's ratio 0.3 squeezed to a tenth of its height: the run is rejected and its law named, by P2/P1",
+        title="A block of Poisson's ratio 0.3 squeezed to a tenth of its height: the run is rejected and its law named, with P2/P1",
         measure=collapses,
         given={"element": "P2/P1", "poisson": POISSON},
         **control("a Poisson ratio of 0.499, which keeps 0.993 of the volume", poisson=0.499),
@@ -161,7 +161,7 @@ ENTRIES: tuple[Entry, ...] = (
     Entry(
         name="law_outside_its_range",
         group="collapse",
-        title="The number of states with less than half of the volume in a squeeze from 1 to 0.4 of the height, by Q1/P0",
+        title="The number of states with less than half of the volume in a squeeze from 1 to 0.4 of the height, with Q1/P0",
         unit="1",
         measure=outside,
         given={"element": "Q1/P0", "poisson": POISSON},
@@ -187,7 +187,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     SMOOTH(
         name="squeeze_volume_k1e3",
-        title="Volume of a block squeezed to a tenth of its height, over its rest volume, K/mu = 1e+03, Q2/Q1",
+        title="Volume of a block squeezed to a tenth of its height, relative to its rest volume, K/mu = 1e+03, Q2/Q1",
         unit="1",
         measure=volume,
         given={"element": "Q2/Q1", "bulk": 10.0},
@@ -216,7 +216,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     GLUED(
         name="bonded_squeeze_is_inverted",
-        title="A cube squeezed to 0.4 of its height between plates that it sticks to folds over at its corners, by Q1/P0",
+        title="A cube squeezed to 0.4 of its height between plates that it sticks to folds over at its corners, with Q1/P0",
         measure=inverts,
         given={"element": "Q1/P0", "count": 4, "height": GLUED_TO},
         **control("squeezed to 0.7 of its height only", height=0.7),
@@ -224,14 +224,14 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     GLUED(
         name="bonded_squeeze_stays_upright",
-        title="A cube squeezed to 0.7 of its height between plates that it sticks to keeps det F above zero, by Q2/Q1",
+        title="A cube squeezed to 0.7 of its height between plates that it sticks to keeps det F above zero, with Q2/Q1",
         measure=stays_upright,
         given={"element": "Q2/Q1", "count": 2, "height": 0.7},
         **control("squeezed to 0.4 of its height", height=GLUED_TO),
     ),
     GLUED(
         name="bonded_squeeze_with_vertices",
-        title="A cube squeezed to 0.4 of its height between plates that it sticks to keeps det F above zero, by P2/P1",
+        title="A cube squeezed to 0.4 of its height between plates that it sticks to keeps det F above zero, with P2/P1",
         measure=stays_upright,
         given={"element": "P2/P1", "count": 2, "height": GLUED_TO},
         **control("a quadrature rule of degree 4, which has no points at the vertices", quadrature_degree=4),

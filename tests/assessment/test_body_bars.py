@@ -75,7 +75,7 @@ def test_bars_of_a_coarse_panel_cover_its_tip(name, element, cells) -> None:
     error = abs(move - getattr(cook, name).tip * panel.share)
     assert error < bars.points[-1, corner] < 4 * error
     assert error / abs(move) < 2 * bars.displacement[-1], "all of the panel is known about as well as its tip"
-    assert f"displacement is known to {100 * bars.displacement[-1]:.2g} % at the last frame" in said[-1]
+    assert f"that of the displacement is {100 * bars.displacement[-1]:.2g} % at the last frame" in said[-1]
 
 
 @pytest.mark.slow

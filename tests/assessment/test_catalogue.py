@@ -96,7 +96,7 @@ def test_a_verification_with_experiments_outside_passes_and_says_how_many_are_me
     ]
     whole = Verification(tuple(found), 1.0, {})
     assert (whole.word, whole.failed) == ("pass", ())
-    assert "1 of 1 pass, 1 of 2 experiments met within their uncertainty" in whole.summary
+    assert "1 of 1 pass, 1 of 2 experiments agree within their uncertainty" in whole.summary
     assert "experiments" not in Verification(tuple(found[:1]), 1.0, {}).summary
 
 

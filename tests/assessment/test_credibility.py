@@ -99,7 +99,7 @@ def test_what_is_quoted_remembered_or_unknown_never_validates(known, from_memory
 def test_what_a_comparison_rests_on_is_said() -> None:
     """The worst text that one of its numbers was read in; a tolerance where one has no deviation, but not of an order."""
     assert of_result(measured(1.0)).rests_on == "abstract"
-    assert of_result(measured(1.0, from_memory=True)).rests_on == "abstract; a part of the model from memory"
+    assert of_result(measured(1.0, from_memory=True)).rests_on == "abstract; part of the model recalled"
     assert of_result(measured(1.0, known=(*SARCOMERES, *QUOTED))).rests_on == "quotation; ± chosen by us"
     assert of_result(measured(1.0, known=QUOTED, from_memory=True)).rests_on == "quotation; ± chosen by us", (
         "of the DOI"
@@ -110,8 +110,8 @@ def test_what_a_comparison_rests_on_is_said() -> None:
 
 
 def test_neither_a_number_nor_a_word_of_a_source_is_a_mode() -> None:
-    """A ratio of 1 known to a half is a number, and a source may bear the word memory."""
-    one = of_result(measured(1.25, within=0.5, source="A memory of muscles"))
+    """A ratio of 1 known to a half is a number, and a source may bear the word recalled."""
+    one = of_result(measured(1.25, within=0.5, source="Muscles recalled"))
     assert not one.is_order
     assert one.validates
     assert graded(one).misses == (0.5,)
@@ -128,7 +128,7 @@ def test_what_is_from_memory_and_what_is_an_order_is_stated_by_the_catalogue() -
     assert {name for name, one in beside.items() if one.is_order} == orders
     assert not [name for name, one in beside.items() if one.validates]
     for one in entries:
-        assert one.from_memory == ("memory" in one.source), one.name
+        assert one.from_memory == ("recalled" in one.source), one.name
 
 
 def test_other_models_are_counted_apart_and_decide_no_grade() -> None:
@@ -164,7 +164,7 @@ def test_a_remark_counts_the_poses_in_which_the_published_arm_is_known() -> None
     published = np.where(made.found.angles < 6, 15.0, np.nan)
     partly = replace(made, published=ArmRange(made.found.angles, published, published))
     assert partly.known == 3
-    assert "over the 3 of 10 poses in which the published arm is known" in of_arms(partly).remark
+    assert "over 3 of 10 poses with a published moment arm" in of_arms(partly).remark
 
 
 def test_a_value_that_has_moved_or_is_not_a_number_is_not_met() -> None:
@@ -227,9 +227,8 @@ def test_stated_bars_are_those_of_the_page_of_error_bars() -> None:
     stated = {one.name: one.bar for one in claims()}
     columns = {"Volume": "volume", "Fibre length": "fibre length, rms", "Surface": "surface, rms"}
     for name, column in columns.items():
-        bars = sorted(
-            (row[head.index(f"error bar of {column}")].removeprefix("± ").split()[0] for row in cases), key=float
-        )
+        (at,) = [i for i, title in enumerate(head) if title.endswith(column)]
+        bars = sorted((row[at].removeprefix("± ").split()[0] for row in cases), key=float)
         assert stated[name].startswith(f"{bars[0]} to {bars[-1]} "), name
     bar, value, where = re.fullmatch(r"± (\S+) kPa on a mean of (\S+) kPa \((\w+)\)", stated["Stress"]).groups()
     (said,) = [one for one in text.split("\n\n") if "mean stress along the fibres" in one]

@@ -119,12 +119,12 @@ def test_exact_attachments_are_where_their_bones_are(tmp_path) -> None:
     lid = replace(problem.bones[1], motion=RigidMotion((1.0, 0.0, 0.0), None, (0.0, 20.0), (0.0, 4.0)))
     high = replace(problem.attached[1], bone=lid)
     problem = replace(problem, bones=(problem.bones[0], lid), attached=(problem.attached[0], high))
-    assert lost(problem, resting(problem)) == ["high off lid"]
+    assert lost(problem, resting(problem)) == ["high away from lid"]
     followed = np.array(resting(problem).positions)
     followed += np.arange(5)[:, None, None] * [1.0, 0.0, 0.0] * (BLOCK.points[:, 2:] / 40)
     run = replace(resting(problem), positions=followed)
     assert lost(problem, run) == []
-    assert lost(problem, replace(run, positions=followed[[0, 1, 3, 2, 4]])) == ["high off lid"]
+    assert lost(problem, replace(run, positions=followed[[0, 1, 3, 2, 4]])) == ["high away from lid"]
 
 
 def test_springs_yield_as_far_as_the_recorded_force_says(tmp_path) -> None:
@@ -136,7 +136,9 @@ def test_springs_yield_as_far_as_the_recorded_force_says(tmp_path) -> None:
     yielded[2][low.vertices] += [0.0, 0.0, 0.5]  # over 100 mm2: 5 N
     run = replace(resting(problem), positions=yielded)
     assert lost(problem, replace(run, scalars={"force_low": np.array([0.0, 0, 5, 0, 0])})) == []
-    assert lost(problem, replace(run, scalars={"force_low": np.array([0.0, 0, 1, 0, 0])})) == ["springs of low, mean"]
+    assert lost(problem, replace(run, scalars={"force_low": np.array([0.0, 0, 1, 0, 0])})) == [
+        "mean extension of springs of low"
+    ]
 
 
 @pytest.mark.slow
@@ -147,8 +149,8 @@ def test_a_turn_takes_steps_enough(tmp_path, last, steps, met) -> None:
     lid = replace(problem.bones[1], motion=Turn((0, 0, 1), (5, 5, 0), (0.0, last), (0.0, 2 * np.pi)))
     problem = replace(problem, bones=(problem.bones[0], lid))
     run = resting(problem, load_steps=np.array([0.0, steps, steps, steps, steps]))
-    assert ("lid turns per load step" in lost(problem, run)) is not met
-    (check,) = (one for one in of_muscle(problem, run) if one.name == "lid turns per load step")
+    assert ("rotation of lid per load step" in lost(problem, run)) is not met
+    (check,) = (one for one in of_muscle(problem, run) if one.name == "rotation of lid per load step")
     assert_allclose(check.value, 2 * np.pi / (steps if last == 2 else 4 * steps))
 
 
@@ -157,7 +159,7 @@ def test_there_and_back_counts_twice(tmp_path) -> None:
     lid = replace(problem.bones[1], motion=Turn((0, 0, 1), (5, 5, 0), (0.0, 1.0, 2.0), (0.0, np.pi, 0.0)))
     problem = replace(problem, bones=(problem.bones[0], lid))
     run = resting(problem, load_steps=np.array([0.0, 2, 1, 1, 1]))
-    assert lost(problem, run) == ["lid turns per load step"]
+    assert lost(problem, run) == ["rotation of lid per load step"]
 
 
 def test_forces_that_are_not_in_balance(tmp_path) -> None:
@@ -223,14 +225,14 @@ def test_a_surface_through_itself(tmp_path) -> None:
     side = np.flatnonzero((BLOCK.points[:, 0] == 10) & (BLOCK.points[:, 2] > 10) & (BLOCK.points[:, 2] < 30))
     through = np.array(resting(problem).positions)
     through[3, side] -= [12.0, 0.0, 0.0]
-    assert lost(problem, replace(resting(problem), positions=through)) == ["the muscle through itself"]
+    assert lost(problem, replace(resting(problem), positions=through)) == ["self-penetration of the muscle"]
     # Where it touches itself it may be as deep as the recorded pressure allows, here 10 MPa over 0.1 MPa/mm, but neither deeper
     # than is recorded nor than a share of the distance between points.
     touches = replace(problem, effects=(*problem.effects, effects.make("touching", stiffness=0.1, smoothing=0.1)))
     run = replace(resting(touches), positions=through)
     slightly = np.array(resting(problem).positions)
     slightly[3, side] -= [10.3, 0.0, 0.0]
-    wrong = ["the muscle through itself"]
+    wrong = ["self-penetration of the muscle"]
     for shape, pressure, deep, names in (
         (through, 10.0, 12.0, wrong),
         (slightly, 0.1, 0.5, []),

@@ -77,7 +77,9 @@ def test_a_denied_run_is_no_truth_anywhere(tmp_path, monkeypatch, capsys) -> Non
     assert (facts["verdict"], facts["status"]) == ("pass", "converged")
     record = facts["second_check"]
     assert all(one["met"] for one in record["checks"])
-    assert {"lid turns per load step", "residual force", "residual moment"} <= {one["name"] for one in record["checks"]}
+    assert {"rotation of lid per load step", "residual force", "residual moment"} <= {
+        one["name"] for one in record["checks"]
+    }
     (folder,) = (out / "runs").glob("fenicsx-*")
     # Two frames of the stored run in each other's place; its record is of another check, so that it is asked again.
     frames = [folder / "surface" / f"frame_{number:04d}.vtp" for number in (5, 10)]
@@ -93,7 +95,7 @@ def test_a_denied_run_is_no_truth_anywhere(tmp_path, monkeypatch, capsys) -> Non
         assert (facts["verdict"], facts["status"]) == ("fail", "denied")
         assert "reference: denied, denied by the second check: " in capsys.readouterr().out
         assert {one["verdict"] for one in facts["verdicts"]} == {"fail"}
-        assert "off lid" in facts["message"]
+        assert "away from lid" in facts["message"]
     assert store.load(folder).outcome.status == "denied"
     (page,) = (path for path in out.rglob("report*.html"))
     assert "which uses positions and forces alone, denies it" in page.read_text()

@@ -103,7 +103,7 @@ def test_where_none_is_good_enough_the_nearest_and_the_reason_are_named(bar, tmp
     assert found["nearest"]["choice"]["sweeps"] == 10
     assert (found["nearest"]["error"], found["nearest"]["bar"]) == (3.0, 2.0)
     status, text = said(bar, out, capsys, "--error", "1 mm")
-    assert (status, "known only to 2 mm" in text) == (cli.VERDICT_FAIL, True)
+    assert (status, "error bar of the truth is 2 mm" in text) == (cli.VERDICT_FAIL, True)
     status, text = said(bar, out, capsys, "--time", "0.5 ms")
     assert "the nearest: pbd: sweeps = 1" in text
 

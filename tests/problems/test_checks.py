@@ -102,7 +102,7 @@ def test_a_tendon_is_not_beside_tension_at_rest() -> None:
     tendon = fr.Prescribed("tendon", skin, ALL, Rest(), 1.0, (0.0, 0.0, 9.0))
     check_agreement(replace(BODY, prescribed=(FIXED, tendon)))
     tense = (*BODY.effects, effects.make("in_situ", stretch=1.1))
-    with pytest.raises(fr.InputError, match="effects: got a tendon beside in_situ, want only one of these"):
+    with pytest.raises(fr.InputError, match="effects: got a tendon together with in_situ, want only one of these"):
         check_agreement(replace(BODY, effects=tense, prescribed=(FIXED, tendon)))
 
 

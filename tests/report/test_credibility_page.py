@@ -65,7 +65,7 @@ def test_each_difference_has_its_direction_and_orders_stand_apart() -> None:
     order = of_result(measured(0.0, truth=1.0, within=0.5, is_order=True))
     said = credibility_page.differences(graded(*numbers, order), ()).split("; ")
     assert said[0] == "2 too great, by 5 to 8 uncertainties"
-    assert said[1:] == ["1 too small, by 3 uncertainties", "1 without a number", "1 of 1 orders of stiffness wrong"]
+    assert said[1:] == ["1 too small, by 3 uncertainties", "1 without a number", "1 of 1 stiffness rankings wrong"]
     assert credibility_page.differences(graded(numbers[0]), ()) == ""
 
 
@@ -100,7 +100,7 @@ def test_the_row_of_arms_has_the_range_of_biases_and_each_case_stands_below_once
     page = credibility_page.page(replace(found(), arms=several))
     text = html.unescape(report.write(page, tmp_path / "new", "credibility").read_text()).replace("\u202f", " ")
     assert "2 of 3 measurements within their uncertainty; 1 too small, by 13 mm; 0 of 1 other models" in text
-    assert text.count("bias 0.0 mm, scatter 0.0 mm over the 10 of 10 poses") == 1
+    assert text.count("bias 0.0 mm, scatter 0.0 mm over 10 of 10 poses") == 1
 
 
 def test_a_fit_is_met_by_the_same_uncertainty_and_unknown_without_a_value() -> None:

@@ -33,7 +33,7 @@ def test_an_error_is_shown_with_the_bar_and_without(bar: float, words: str) -> N
 
 def test_the_reason_is_the_bar_where_it_is() -> None:
     assert "without the bar, the error would be within 2.50 mm" in said(2.0, error=2.5, time=0.01)
-    assert "the truth itself is known only to 2 mm" in said(2.0, error=1.0)
+    assert "the error bar of the truth is 2 mm" in said(2.0, error=1.0)
     nearest = said(2.0, time=0.0005)
     assert nearest.splitlines()[1] == "the nearest: pbd: sweeps = 1"
     assert "bar it would" not in nearest

@@ -28,7 +28,7 @@ def test_the_page_names_what_failed_is_stale_missing_or_changed() -> None:
 
 def test_the_text_has_a_line_for_each_row() -> None:
     lines = standings_page.text(found()).splitlines()
-    assert "hip: FEM, reference 1: converged, surface rms known to 0.2 mm" in lines
+    assert "hip: FEM, reference 1: converged, error bar ± 0.2 mm" in lines
     assert "hip: PBD, lost 1: exploded: a vertex is 9e9 mm away" in lines  # without its small number
     assert any(line.startswith("hip: PBD, old 1: converged (stale), surface rms 2 mm, left out 0 mm") for line in lines)
     assert lines[-2:] == ["hip, new: left out, no such package", "changed: hip, old: 1 mm, now 2 mm"]

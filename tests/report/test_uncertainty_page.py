@@ -16,7 +16,7 @@ def test_the_answer_is_the_first_sentence_and_candidates_are_sorted_by_it() -> N
     first, inside, undecided, outside = uncertainty_page.sentences(study(SURFACE, band()))
     assert first == (
         "In each frame, in 95 of 100 cases with other parameters in their ranges, the surface is within 2 mm of this case's, rms, "
-        "where the reference itself is known to 0.100 mm. Its main cause is mooney_rivlin c1 (70 % of the variance)."
+        "where the error bar of the reference is ± 0.100 mm. Its main source is mooney_rivlin c1 (70 % of the variance)."
     )
     assert inside == "Candidates whose surface error is smaller than the effect of the unknown parameters: fast."
     assert undecided.endswith("given the error bar of the reference: near.")

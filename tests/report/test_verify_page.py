@@ -52,7 +52,7 @@ def test_experiments_stand_apart_and_outside_is_no_failure() -> None:
     for found, drawings in ((alone, 0), (both, 1)):
         text = verify_page.page(found).html()
         assert '<span class="badge outside">outside</span>' in text
-        assert "0 of 1 experiments met within their uncertainty: outside is a finding" in text
+        assert "0 of 1 experiments agree within their uncertainty: outside is a finding" in text
         assert text.count("<svg ") == drawings
         assert "0 of 1 within</small>" in text
         assert "<b>Uncertainty:</b>" in text

@@ -134,7 +134,7 @@ def test_a_submission_that_is_not_as_it_was_submitted_is_refused(place, capsys) 
         refused(f"candidate.toml: {key}: got nothing, want this key in a submission")
     submit(place / "mine")
     (place / "mine" / "more.ply").write_text("x")
-    refused("sha256: got no more.ply, want every file beside it")
+    refused("sha256: got no more.ply, want every file next to it")
     (place / "mine" / "more.ply").unlink()
     body = small.body()
     files.write_surface(place / "mine" / "frame_0020.ply", body, body.points)
@@ -220,7 +220,7 @@ def test_a_reference_that_fails_leaves_the_rows_before_stale(monkeypatch) -> Non
 @pytest.mark.usefixtures("place")
 def test_bad_states_are_named(capsys) -> None:
     assert cli.main(["standings", "./bar", "--only", "old"]) == cli.BAD_INPUT
-    assert '--only: got "old", want some of failed,stale' in capsys.readouterr().err
+    assert '--only: got "old", want one or more of failed,stale' in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("place")

@@ -97,7 +97,7 @@ def _finish(kind: str, path: Path, data: Any) -> None:
 
 
 def write_blocks(path: Path, blocks: Tree) -> None:
-    """Write a VTM file of ``blocks`` by name, with their files in a folder beside it, not atomically; OSError if that fails."""
+    """Write a VTM file of ``blocks`` by name, with their files in a folder next to it, not atomically; OSError if that fails."""
     _finish("XMLMultiBlockDataWriter", path, _collection(blocks))
 
 

@@ -46,7 +46,7 @@ class Via(Record):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if (self.joint is None) == (self.within is not None or bool(self.curve)):
-            raise ValueError('"joint" beside "within" or "curve" and only there')
+            raise ValueError('"joint" together with "within" or "curve", and only then')
         if self.within is not None and not self.within[0] < self.within[1]:
             raise ValueError('"within" from an angle to a greater one')
         angles = [point.angle for point in self.curve]

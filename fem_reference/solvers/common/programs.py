@@ -16,7 +16,7 @@ from typing import IO
 from fem_reference.foundations.subprocesses import peak_memory, processor_times
 from fem_reference.runs.contents import Status
 
-# The limit of clock time over the limit of processor time: beyond this the machine is too busy, or the program waits.
+# The ratio of the limit of clock time to the limit of processor time: beyond this the machine is too busy, or the program waits.
 CLOCK = 10
 # The time between two checks of a program: a share of its time so far, between a least and a greatest time [s].
 _SHARE, _GLANCES = 0.05, (0.05, 1.0)

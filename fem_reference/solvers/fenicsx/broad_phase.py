@@ -69,7 +69,7 @@ class Nearby:
     ) -> tuple[Ints, Floats, Floats]:
         """The points (n,) whose straight path since the last converged state may have come within reach, and the ends (n, 3) of
         the path, which ``before`` and ``after`` give for any points. A patch that was not examined since then, and the paths of its
-        points, lie in a ball clear of the bone.
+        points, lie in a sphere clear of the bone.
         """
         points, _ = self.patches.points(np.flatnonzero(self.met))
         starts, ends = before(points), after(points)

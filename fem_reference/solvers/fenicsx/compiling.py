@@ -141,7 +141,7 @@ class _WithoutVariables(MultiFunction):  # type: ignore[misc]  # UFL has no type
 
 
 def library(source: Path, sizes: dict[str, int]) -> CDLL:
-    """The functions of a C file, compiled with ``sizes`` and kept beside FFCx's compiled forms."""
+    """The functions of a C file, compiled with ``sizes`` and kept with FFCx's compiled forms."""
     flags = [*FLAGS, *(f"-D{name}={value}" for name, value in sizes.items())]
     return native.library(source, flags, Path(jit.get_options()["cache_dir"]))
 

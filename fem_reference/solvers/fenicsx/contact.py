@@ -33,8 +33,8 @@ _RIM = 0.25
 @dataclass(frozen=True, eq=False)
 class Pressed:
     """Contact with one bone: ``gap`` (m,) [mm], negative inside, of the points ``near`` (m,); no other point is within the
-    smoothing. For the ``pressed`` points (k,) among them it has the ``pressure`` (k,) [MPa per rest area], the ``traction`` (k, 3)
-    and its derivative ``slope`` (k, 3, 3) [MPa/mm], both with friction, and the friction's ``grip``.
+    smoothing. For the ``pressed`` points (k,) among them it has the ``pressure`` (k,) [MPa per unit rest area], the ``traction``
+    (k, 3) and its derivative ``slope`` (k, 3, 3) [MPa/mm], both with friction, and the friction's ``grip``.
     """
 
     near: Ints
@@ -248,7 +248,7 @@ class ContactForces:
         return Trouble("diverged", why) if why else None
 
     def _yielded(self) -> list[tuple[float, str]]:
-        """The bones with a pressed point so deep that it could leave on any side, with its depth over half the thickness."""
+        """The bones with a pressed point so deep that it could leave on any side, with its depth relative to half the thickness."""
         mine, allowed = list[tuple[float, str]](), self.law.allowance(self.frame)
         for entry, one, before in zip(self.bones, self.now, self.overlaps, strict=True):
             depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))

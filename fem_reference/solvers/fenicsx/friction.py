@@ -17,7 +17,7 @@ Before = Callable[[Ints], tuple[Floats, Floats]]
 @dataclass(frozen=True, eq=False)
 class Grip:
     """Friction of n points ``which`` (n,): the ``traction`` (n, 3) [MPa] and its ``slope`` (n, 3, 3), the places ``stuck`` (n, 3)
-    that hold the points, all in the frame of the bone, and the work per rest area ``lost`` (n,) [N/mm] since the settled state.
+    that hold the points, all in the frame of the bone, and the work ``lost`` (n,) [N/mm] per unit rest area since it settled.
     """
 
     which: Ints

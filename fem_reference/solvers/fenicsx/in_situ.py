@@ -50,7 +50,7 @@ def balance(form: Form, system: System, linear: LinearSolver, residual: float) -
 
 
 class Supports:
-    """The bones of ``contact`` at rest, as one-sided springs of the law's stiffness at the points that touch them, for any
+    """The bones of ``contact`` at rest, as one-sided springs of the law's stiffness at the points that touch them, whatever the
     smoothing. Other points within the smoothing do not count at rest.
     """
 

@@ -14,24 +14,24 @@ from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
 from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 
-_ITERATIONS = 40  # iterations of inverse iteration
+_ITERATIONS = 40  # the number of inverse iterations
 _LARGER = (1, 2, 4, 8)  # factors of the perturbation, tried in turn if the state returns or no solution is found
 _SHIFT, _GROWTH = 1e-6, 4.0
-_DIFFERENCE = 1e-3  # of the smallest load step: the interval for differences along the path
+_DIFFERENCE = 1e-3  # the interval for differences along the path, as a share of the smallest load step
 # The greatest reported distance to a limit point, in smallest load steps. The step that failed was up to two of them long, and the
 # distance is known only up to a factor.
 _NEAR = 4
-_SOFT = 0.3  # The largest share of its stiffness at rest that the softest mode keeps near a limit point.
+_SOFT = 0.3  # Near a limit point, the stiffness of the softest mode is at most this share of its value at rest.
 
 
 def softest(body: AssembledBody, linear: LinearSolver) -> PETSc.Vec:
     """The mode of the least eigenvalue, by magnitude, of the matrix of ``linear``; its displacements have length 1.
 
-    It is found by inverse iteration from a random start; displacements alone have a mass. ``LinearSolveError`` if none is free.
+    By inverse iteration from a random start; only displacements have a mass. ``LinearSolveError`` if no displacement is free.
     """
     moves = _free(body)
     if not body.comm.allreduce(moves.any(), MPI.LOR):
-        raise LinearSolveError("nothing is left to move")
+        raise LinearSolveError("all displacements are prescribed")
     vector: PETSc.Vec = body.system.b.duplicate()
     image: PETSc.Vec = body.system.b.duplicate()
     image.array[:] = moves * np.random.default_rng(body.comm.rank).normal(size=len(moves))
@@ -45,7 +45,7 @@ def softest(body: AssembledBody, linear: LinearSolver) -> PETSc.Vec:
 
 
 def _free(body: AssembledBody) -> Floats:
-    """A vector with 1 for each displacement that this rank owns and none prescribes, 0 for every other unknown."""
+    """A vector with 1 for each displacement that this rank owns and that is not prescribed, 0 for every other unknown."""
     free = np.zeros(body.system.size)
     free[body.displacement.dofs.ravel()] = 1.0
     free[body.system.fixed] = 0.0
@@ -61,7 +61,7 @@ def _displacements(body: AssembledBody, mode: PETSc.Vec) -> Floats:
 
 def leave(body: AssembledBody, frame: float, share: float) -> float | None:
     """Perturb the present state, at ``frame``, by a ``share`` of the body's size along its lowest mode, and solve again until there
-    are fewer negative modes. Returns the perturbation [mm], None if the state is stable or no other state was found. Collective.
+    are fewer negative modes. Returns the perturbation [mm], None if the state is stable or no other state is found. Collective.
     """
     if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
         return None
@@ -83,7 +83,7 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
 
 def _lowest(body: AssembledBody, pressures: int) -> Floats:
     """The displacement of the unknowns (n,), 1 mm at most, along which the energy falls most, by inverse iteration with a shift
-    that leaves the tangent no negative pivots except those of its ``pressures``.
+    for which the tangent has no negative pivots except those of its ``pressures``.
     """
     system, free, dofs = body.system, _free(body), body.displacement.dofs
     system.linearise()
@@ -111,14 +111,14 @@ def _shifted(body: AssembledBody, shift: Floats) -> Factorised:
 
 @dataclass(frozen=True)
 class LimitPoint:
-    """The ``frame`` of a limit point, and the rest position ``at`` [mm] at which the softest mode moves most."""
+    """The ``frame`` of a limit point, and the rest position ``at`` [mm] of the largest displacement of the softest mode."""
 
     frame: float
     at: tuple[float, float, float]
 
     def __str__(self) -> str:
         return (
-            f"the equilibrium comes to a limit point at frame {self.frame:.4g}, where the stiffness of its softest mode, "
+            f"the equilibrium reaches a limit point at frame {self.frame:.4g}, where the stiffness of its softest mode, "
             f"largest at {place_of(self.at)}, is 0: beyond it there is no equilibrium nearby, and the body snaps"
         )
 
@@ -194,7 +194,7 @@ def _stiffness(body: AssembledBody, mode: PETSc.Vec) -> float:
 
 
 def _largest(body: AssembledBody, mode: PETSc.Vec) -> tuple[float, float, float]:
-    """The rest position [mm] at which a mode moves most."""
+    """The rest position [mm] of the largest displacement of a mode."""
     lengths = np.linalg.norm(_displacements(body, mode), axis=1)
     place = body.displacement.space.tabulate_dof_coordinates()[np.argmax(lengths)].tolist()
     _, (x, y, z) = max(body.comm.allgather((float(lengths.max()), place)))

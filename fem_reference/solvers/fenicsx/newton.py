@@ -17,7 +17,7 @@ _KEPT, _SHORTEST = 0.1, 1e-2
 # Eisenstat and Walker 1996 (doi 10.1137/0917003), choice 2: the tolerance of the first linear system, then the factor of later
 # tolerances and their bounds.
 _FIRST, _FACTOR, _LOOSEST, _TIGHTEST = 1e-3, 0.5, 1e-3, 1e-9
-# Newton's method gives up if the residual did not fall to ``_PROGRESS`` times its earlier best within ``_PATIENCE`` iterations.
+# Newton's method gives up if the residual has not fallen to ``_PROGRESS`` times its earlier best within ``_PATIENCE`` iterations.
 _PATIENCE, _PROGRESS = 6, 0.5
 # A linear solution that would end below the target of Newton's method continues to this share of the target, as the residual of the
 # last linear system is the residual of the entire iteration.

@@ -64,7 +64,7 @@ class Path:
         stiffens, or a rotation, its error is tenths of the energy in the first step from rest. So beyond ``ENERGY_GAP`` the
         function ``halfway`` solves for a state halfway, puts it into the unknowns, which are restored afterwards, and returns True
         if it was found. Then Simpson's rule is used, whose error is of fourth order. In a jump the energy falls without work by
-        either rule. ``gap`` is the greatest difference since ``gap`` was last read, over the greatest energy so far.
+        either rule. ``gap`` is the greatest difference since ``gap`` was last read, divided by the greatest energy so far.
         """
         states = [
             (self.unknowns, self.forces),

@@ -49,7 +49,7 @@ def require_installed() -> None:
 
 
 def mpiexec() -> str | None:
-    """The wheel's own ``mpiexec`` beside the interpreter, else one on the PATH, maybe of another MPI; None if there is none."""
+    """The wheel's own ``mpiexec`` next to the interpreter, else one on the PATH, maybe of another MPI; None if there is none."""
     beside = Path(sys.executable).with_name("mpiexec")
     return str(beside) if beside.exists() else shutil.which("mpiexec")
 
@@ -63,7 +63,7 @@ def command_line(ranks: int) -> list[str]:
     if ranks > (most := max(_MOST_RANKS, os.cpu_count() or 1)):
         raise InputError("ranks", ranks, f"at most {most} on this machine")
     if runner is None:
-        raise MissingSoftware(f"{ranks} ranks need mpiexec, which is neither beside {sys.executable} nor on the PATH")
+        raise MissingSoftware(f"{ranks} ranks need mpiexec, which is neither next to {sys.executable} nor on the PATH")
     return [runner, "-n", str(ranks), *worker]
 
 

@@ -20,14 +20,14 @@ class RestStress:
         self.shear, self.bulk = (fem.Constant(unknowns.function_space.mesh, one) for one in moduli_of(effects))
 
     def energy(self, state: State) -> Any:
-        """The energy per rest volume [MPa] of the stress at rest."""
+        """The energy per unit rest volume [MPa] of the stress at rest."""
         displacement, *others = ufl.split(self.response)
         slopes = ufl.grad(displacement)
         pressure = others[0] if others else self.bulk * ufl.tr(slopes)
         return balancing(state, [[slopes[i, k] for k in range(3)] for i in range(3)], pressure, self.shear)
 
     def isotropic(self, state: State) -> Any:
-        """The energy per rest volume [MPa] of the isotropic body."""
+        """The energy per unit rest volume [MPa] of the isotropic body."""
         volume = IncompressiblePenalty if state.pressure is None else Incompressible
         matrix, resistance = NeoHooke.model_construct(mu=self.shear), volume.model_construct(bulk=self.bulk)
         return matrix.energy(state) + resistance.energy(state)

@@ -23,7 +23,7 @@ from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme, le
 from fem_reference.solvers.fenicsx.forms import Form, Rule
 from fem_reference.solvers.fenicsx.meshes import geometry
 
-# A cell with less than this share of its rest volume has collapsed, for any ranges of laws: about four fifths of muscle are
+# A cell with less than this share of its rest volume has collapsed, whatever the ranges of laws: about four fifths of muscle are
 # water, which does not leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal muscle),
 # and a fifth of the volume would barely contain the solid part. A body has collapsed if such cells are more than this share of it
 # at rest; at a rim their share decreases with the size of cells.
@@ -87,7 +87,7 @@ class Validity:
         self.here = State(F=(), regions=body.shares(self.centres, self.cells))
 
     def volume_ratio(self) -> float:
-        """The present volume of the body over its rest volume."""
+        """The ratio of the present volume of the body to its rest volume."""
         now = self.volumes.ravel() @ self.values["V/V0"]()
         present, rest = self.mesh.comm.allreduce(np.array([now, self.volumes.sum()]), MPI.SUM)
         return float(present / rest)

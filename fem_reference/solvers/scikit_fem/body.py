@@ -1,4 +1,4 @@
-"""Bodies: equilibrium by Newton's method, with the stress and stiffness that jets differentiate from the effects' energies."""
+"""Bodies: equilibrium by Newton's method; stress and stiffness by automatic differentiation (jets) of the effects' energies."""
 
 import logging
 import time
@@ -31,7 +31,7 @@ _GROWTH = 10.0  # the growth of the residual above which a Newton step is halved
 class ScikitBodySettings(Record):
     """Numerical settings for a body; load steps are in frame numbers.
 
-    ``element``: one of ``body.ELEMENTS``. The load step begins with ``first_step``, by default one step to each frame. It grows by
+    ``element``: one of ``body.ELEMENTS``. The load step begins with ``first_step``, by default one step per frame. It grows by
     half after an easy step (at most 5 Newton iterations) and is halved, down to ``smallest_step``, if Newton's method needs more
     than ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal forces and
     of the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are integrated exactly
@@ -50,7 +50,7 @@ def _check_known(body: Body) -> None:
     """Raise InputError if a body has a part that this solver does not support."""
     if body.contact is not None or body.touching:
         name, got = ("touching", "parts that touch") if body.touching else ("contact", "bones")
-        raise InputError(name, got, "a body without it, as this solver has no contact")
+        raise InputError(name, got, "a body without contact, which this solver does not support")
     if any(not isinstance(entry.on, str) for entry in body.prescribed):
         want = "springs on facets, as this solver has no other springs"
         raise InputError("prescribed", "springs at points of a skin", want)
@@ -63,7 +63,7 @@ def _check_known(body: Body) -> None:
         want = "effects that leave the body at rest, as this solver balances no tension at rest"
         raise InputError("effects", "in_situ", want)
     if any(isinstance(effect, Load) and effect.stored for effect in body.effects):
-        raise InputError("effects", "membrane", "effects without it: this solver has no energy of a surface")
+        raise InputError("effects", "membrane", "other effects: this solver has no surface energies")
 
 
 def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
@@ -117,7 +117,7 @@ class March:
         self.nodes = {entry.name: self.equations.space.nodes_on(str(entry.on)) for entry in body.prescribed}
 
     def attempt(self, frame: float) -> Attempt:
-        """Solve at ``frame`` from the last state, which stays where it fails. A state in which det F is not positive, at a
+        """Solve at ``frame`` from the last state, which is kept if the attempt fails. A state in which det F is not positive, at a
         quadrature point or a vertex, is *inverted* even if Newton's method converged.
         """
         with np.errstate(all="ignore"):  # a step with numbers that are not finite has failed
@@ -176,7 +176,7 @@ class March:
         return None
 
     def fixed(self, frame: float) -> tuple[Ints, Floats]:
-        """The unknowns that are prescribed exactly, each once, and their values at ``frame``."""
+        """The unknowns (k,) that are prescribed exactly, without duplicates, and their values (k,) at ``frame``."""
         values: dict[int, float] = {}
         for entry in self.body.prescribed:
             if entry.stiffness is None:
@@ -187,7 +187,7 @@ class March:
         return np.array(list(values), np.int64), np.array(list(values.values()))
 
     def state(self, step: Step) -> Frame:
-        """The present unknowns as a state."""
+        """The present state."""
         equations, unknowns = self.equations, self.unknowns
         places = equations.space.rest + unknowns[: equations.space.rest.size].reshape(-1, 3)
         residual, _ = equations.assembled(unknowns, step.frame, springs=False)

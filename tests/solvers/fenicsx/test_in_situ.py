@@ -191,4 +191,6 @@ def test_the_second_check_knows_the_force_at_rest_of_springs(session) -> None:  
     assert run.scalars["force_top"][1] < 0.2 * run.scalars["force_top"][0]
     assert all(one.met for one in of_muscle(problem, run))
     other = replace(problem, effects=effects[:3])
-    assert {one.name for one in of_muscle(other, run) if not one.met} == {f"springs of {one}, mean" for one in skins}
+    assert {one.name for one in of_muscle(other, run) if not one.met} == {
+        f"mean extension of springs of {one}" for one in skins
+    }
