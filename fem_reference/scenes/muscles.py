@@ -81,7 +81,7 @@ class MusclesCase(DrivenCase):
 
     @property
     def decides(self) -> list[Any]:
-        """What determines verdicts, as for one muscle, without the expectations of single muscles."""
+        """Everything that affects verdicts, as for one muscle, without the expectations of single muscles."""
         judged = self.model_copy(update={"expect": tuple(one for muscle in self.muscle for one in muscle.expect)})
         return [self.determining(), *super(MusclesCase, judged).decides[1:]]
 
