@@ -122,7 +122,7 @@ class Row:
     @property
     def grade(self) -> Grade:
         """The grade: "outside" if it disagrees with one measurement, else "validated" if some measurement counts as validation,
-        else "indicative"; "verified only" without a known experiment, "not measured" without its results. Models do not count.
+        else "indicative"; "verified only" without a known experiment, "not compared" without its results. Models do not count.
         """
         met, of = self.measured
         if of == 0:
