@@ -15,14 +15,16 @@ class MuscleContact(Interaction):
 
     ``stiffness`` [MPa/mm]: under the pressure p the two sides overlap by at most p / stiffness. ``smoothing`` [mm]: the distance at
     which contact begins, and the greatest overlap of two muscles, or of a muscle with itself, that is allowed at rest.
-    ``friction``: the coefficient of Coulomb's law, greater than 0; without it contact is frictionless. Each of several muscles
-    touches the others but not itself.
+    ``friction``: the coefficient of Coulomb's law, greater than 0; without it contact is frictionless. ``own_normals``: True if
+    the gap between two muscles is measured along the normal of each point instead of to the nearest place, without friction. Each
+    of several muscles touches the others but not itself.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm"}
     stiffness: AreaStiffness
     smoothing: PositiveLength
     friction: float | None = Field(default=None, gt=0)
+    own_normals: bool = False
 
 
 def among(acting: Iterable[Effect]) -> MuscleContact | None:

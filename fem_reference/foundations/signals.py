@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import threading
+from contextlib import suppress
 
 TERMINATED = 143  # the status that shells report
 _RAISED = {KeyboardInterrupt: signal.SIGINT, SystemExit: signal.SIGTERM}
@@ -18,8 +19,10 @@ def listen() -> None:
     before = sys.unraisablehook
 
     def lost(found: "sys.UnraisableHookArgs") -> None:
-        if found.exc_type in _RAISED:
-            threading.Timer(_AGAIN, os.kill, (os.getpid(), _RAISED[found.exc_type])).start()
+        ours = found.exc_type is KeyboardInterrupt or getattr(found.exc_value, "code", None) == TERMINATED
+        if ours and found.exc_type in _RAISED:
+            with suppress(RuntimeError):  # the interpreter ends
+                threading.Timer(_AGAIN, os.kill, (os.getpid(), _RAISED[found.exc_type])).start()
         else:
             before(found)
 

@@ -5,6 +5,7 @@ Scene records consist of the annotated types: a field of type ``Pressure`` takes
 
 import math
 import re
+import threading
 import tomllib
 from collections.abc import Sequence
 from functools import cache, partial
@@ -37,6 +38,7 @@ COMMON: dict[tuple[str, str], float] = {
     (unit, inside): factor for inside, units in _FILE["common"].items() for unit, factor in units.items()
 }
 # A number, then possibly a unit.
+_ONE_BY_ONE = threading.Lock()
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
 # Forbidden in a unit: an exponent that is not an integer of one or two digits, or that has an exponent itself, as in mm^9^9^9.
 _NO_UNIT = re.compile(r"(?:\^|\*\*)(?!\s*[+-]?\d{1,2}(?![\w.])(?!\s*(?:\^|\*\*)))", re.ASCII)
@@ -85,10 +87,12 @@ def _factor(unit: str, inside: str) -> float:
     """The number of units ``inside`` in one ``unit``; an error of pint, or NaN, if the two are of different kinds."""
     if unit == inside or (unit, inside) in COMMON:
         return COMMON.get((unit, inside), 1.0)
-    one = _registry().Quantity(1.0, _registry().parse_units(unit))
-    factor = float(one.to(inside or "dimensionless").magnitude)
-    # For pint an angle has no dimension; only its root unit distinguishes it.
-    same = one.to_root_units().units == _registry().Quantity(1.0, inside).to_root_units().units
+    with _ONE_BY_ONE:  # two threads would each build a registry, and quantities of two registries do not compare
+        registry = _registry()
+        one = registry.Quantity(1.0, registry.parse_units(unit))
+        factor = float(one.to(inside or "dimensionless").magnitude)
+        # For pint an angle has no dimension; only its root unit distinguishes it.
+        same = one.to_root_units().units == registry.Quantity(1.0, inside).to_root_units().units
     return factor if same else math.nan
 
 

@@ -15,6 +15,7 @@ from fem_reference.geometry.boxes import within
 # Gathering three coordinates into a vector takes longer than it saves.
 _FLAGS = ("-O3", "-march=native", "-fno-tree-slp-vectorize")
 _ROOM = 1000
+_FARTHEST = 1e307  # [mm]
 
 
 class _Triangles(ctypes.Structure):
@@ -46,10 +47,10 @@ _kept = lru_cache(maxsize=8)(_Sorted)
 def near_pairs(one: Surface, other: Surface) -> Ints | None:
     """Pairs (k, 2) of triangles of two surfaces, or of one surface with itself, that may intersect or touch: every pair that does,
     once, and few others. Triangles of one surface that share an edge, or only touch at a common corner, are left out. None without
-    a compiler, or if a point is not finite. The search is faster if ``other`` is the surface of an earlier call.
+    a compiler, or if a point is not finite or very far. The search is faster if ``other`` is the surface of an earlier call.
     """
     code = _code()
-    if code is None or not all(np.isfinite(surface.points).all() for surface in (one, other)):
+    if code is None or not _moderate(one.points, other.points):
         return None
     pairs = np.zeros((0, 2), np.int64)
     if not (len(one.triangles) and len(other.triangles)):
@@ -64,14 +65,13 @@ def near_pairs(one: Surface, other: Surface) -> Ints | None:
 
 def reached(surface: Surface, points: Floats, reach: Floats) -> Ints:
     """The triangles (k,) whose bounding boxes come within ``reach`` (n,) [mm] of one of ``points`` (n, 3) along each axis: all that
-    do, and without a compiler some others.
+    do, and some others without a compiler, or if a place is not finite or very far.
     """
-    corners, numbers, code = (
-        np.stack([points.T - reach, points.T + reach]).transpose(0, 2, 1),
-        np.arange(len(points)),
-        _code(),
-    )
-    if code is None:
+    if not len(points):
+        return np.zeros(0, np.int64)
+    numbers, code = np.arange(len(points)), _code()
+    corners = np.stack([points.T - reach, points.T + reach]).transpose(0, 2, 1)
+    if code is None or not _moderate(surface.points, corners):
         return within(surface, corners[0].min(axis=0), corners[1].max(axis=0))
     # The box of a triangle with two equal corners is that of its ends.
     boxes = _Sorted(Surface(corners.reshape(-1, 3), np.stack([numbers, numbers + len(points), numbers], axis=1)), code)
@@ -79,11 +79,18 @@ def reached(surface: Surface, points: Floats, reach: Floats) -> Ints:
     return found[: code.reached(_Triangles.of(surface), boxes.grid, found.ctypes.data)]
 
 
+def _moderate(*places: Floats) -> bool:
+    """True if all coordinates are finite and below ``_FARTHEST``, so that differences do not overflow."""
+    return all(np.abs(some).max(initial=0.0) < _FARTHEST for some in places)
+
+
 @lru_cache(maxsize=16)
 def parts_of(surface: Surface) -> tuple[Ints, Ints]:
     """The first vertices (k,) of the connected parts of a ``surface``, and that of the part of each vertex (n,), up to the last
-    vertex of a triangle.
+    vertex of a triangle; ValueError if a vertex number is negative.
     """
+    if surface.triangles.min(initial=0) < 0:
+        raise ValueError("a triangle has a negative vertex number")
     count, code = int(surface.triangles.max(initial=-1)) + 1, _code()
     found = np.empty(count, np.int64)
     if code is None:

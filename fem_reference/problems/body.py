@@ -233,8 +233,8 @@ class Body:
 
     @property
     def has_energy(self) -> bool:
-        """True if contact has an energy: without friction and without two parts that touch, so that its tangent is symmetric."""
-        return not (self.rubs or any(law.along_normals for law in self.touching))
+        """True if contact has an energy, so that its tangent is symmetric: without friction and own normals."""
+        return not (self.rubs or any(law.own_normals for law in self.touching))
 
     @property
     def remembers(self) -> bool:

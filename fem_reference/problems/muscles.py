@@ -138,7 +138,8 @@ class MusclesProblem:
             assert law is not None  # without contact no pair may touch
             at = called(one, "free"), called(other, "free")
             removed = relaxed if self._near_at_rest(one, other) else None
-            touching.append(Touching(*at, law.stiffness, law.smoothing, law.friction, removed, law.friction is None))
+            smooth = law.friction is None
+            touching.append(Touching(*at, law.stiffness, law.smoothing, law.friction, removed, smooth, law.own_normals))
         return join(bodies, tuple(touching))
 
     def _near_at_rest(self, one: str, other: str) -> bool:

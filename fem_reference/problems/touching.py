@@ -23,7 +23,9 @@ class Touching:
     at rest is removed, as with bones. If None, an overlap of two parts presses at once, and an overlap of a part with itself only
     after it has opened. ``around``: True if points of either part also touch the skin around the other part, such as
     attached skin; otherwise a point that slides past the rim of the other part ends the run. This skin has no contact points, so
-    contact there is half as stiff: the mean traction is half the reported pressure, and half the area counts.
+    contact there is half as stiff: the mean traction is half the reported pressure, and half the area counts. ``own_normals``: True
+    if the gap is measured along the points' own normals instead of to the nearest place, between two parts without friction: slip
+    is counted from the nearest place, and behind a part that touches itself is this part.
     """
 
     one: str
@@ -33,13 +35,7 @@ class Touching:
     friction: float | None = None
     relaxed: tuple[float, float] | None = None
     around: bool = False
-
-    @property
-    def along_normals(self) -> bool:
-        """True if the gap is measured along the points' own normals, between two parts without friction; otherwise to the nearest
-        place. Slip is counted from that place; and what lies behind a point of a part that touches itself is the part itself.
-        """
-        return self.friction is None and self.one != self.other
+    own_normals: bool = False
 
     @property
     def forces(self) -> tuple[str, str]:
@@ -85,6 +81,9 @@ def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[st
         for name, value in (("stiffness", law.stiffness), ("smoothing", law.smoothing)):
             if not (isfinite(value) and value > 0):
                 raise InputError(f"touching[{i}].{name}", value, "a number above 0")
+        if law.own_normals and (law.friction is not None or law.one == law.other):
+            got = "True with friction" if law.friction else "True for a part that touches itself"
+            raise InputError(f"touching[{i}].own_normals", got, "two parts without friction")
         if law.one != law.other and len(np.intersect1d(piece[facets[law.one]], piece[facets[law.other]])):
             got = f'"{law.one}" and "{law.other}" on one connected piece of the mesh'
             raise InputError(f"touching[{i}]", got, "regions of separate pieces, or one region with itself")

@@ -5,6 +5,7 @@ import numpy as np
 from fem_reference.effects import Effect, Load, PassiveFibres, Ramped, in_situ
 from fem_reference.effects.contact import Contact, among
 from fem_reference.effects.damping import Damping
+from fem_reference.effects.touching import MuscleContact
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.material_point import fibre_tension
 from fem_reference.foundations.records import Record, check_once, check_used, join
@@ -99,6 +100,9 @@ def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, p
             if effect.friction is not None and in_situ.among(acting) is not None:
                 want = 'no friction with "in_situ", which balances pressures at rest without friction'
                 raise InputError(join(place, f"effect[{i}].friction"), f"{effect.friction:g}", want)
+        if isinstance(effect, MuscleContact) and effect.own_normals and effect.friction is not None:
+            got = f"true, with a friction of {effect.friction:g}"
+            raise InputError(join(place, f"effect[{i}].own_normals"), got, "no friction, which needs the nearest place")
         if isinstance(effect, Effect) and "interval" in effect.needs and frames.interval is None:
             want = f"the time from a frame number to the next, which effect[{i}] ({effect.title}) needs"
             raise InputError(join(place, "frames.interval"), "nothing", want)

@@ -4,11 +4,13 @@ Conversions are powers of ten and pi / 180, so that only rounding separates them
 """
 
 import math
+import subprocess
 
 import pint
 import pytest
 
 from fem_reference.foundations import units
+from fem_reference.foundations.subprocesses import command
 from fem_reference.foundations.units import length_unit, quantity, three, unit_of
 
 
@@ -171,3 +173,24 @@ def test_common_units_are_those_of_pint_to_the_last_digit() -> None:
         one = registry.Quantity(1.0, registry.parse_units(unit))
         assert one.to(inside or "dimensionless").magnitude == factor, unit
         assert one.to_root_units().units == registry.Quantity(1.0, inside).to_root_units().units, unit
+
+
+_THREADS = """
+import sys, threading
+from fem_reference.foundations.units import quantity
+sys.setswitchinterval(1e-5)
+found, begin = [], threading.Barrier(8)
+def read(i):
+    begin.wait()
+    found.append(quantity(f"{i} fortnight", "a time"))
+threads = [threading.Thread(target=read, args=(i,)) for i in range(1, 9)]
+for one in threads: one.start()
+for one in threads: one.join()
+assert sorted(found) == [1209600.0 * i for i in range(1, 9)], found
+"""
+
+
+@pytest.mark.slow
+def test_threads_share_one_registry() -> None:
+    # Without a lock each built its own: in most of such processes a unit was then said to be none.
+    subprocess.run(command("-c", _THREADS), check=True, timeout=60)

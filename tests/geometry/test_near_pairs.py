@@ -205,3 +205,24 @@ def test_without_a_compiler_the_answers_are_the_same(monkeypatch) -> None:
         assert reached(given, middle, np.ones(1)).tolist() == near.tolist()
     finally:
         module._code.cache_clear()
+
+
+@pytest.mark.parametrize("far", [1e155, 1e300, 1.7e308])
+def test_places_very_far_away_are_searched(far) -> None:
+    """Differences of the farthest overflow, and so would the cells of a grid; of the others only squares do."""
+    ball = shapes.sphere(1, 1.0)
+    lost = ball.moved_to(ball.points * far)
+    assert (near_pairs(lost, lost) is None) == (far > 1e307)
+    assert len(reached(lost, np.zeros((1, 3)), np.array([far]))) > 0
+
+
+def test_an_infinite_reach_is_of_all_triangles_and_no_points_of_none() -> None:
+    ball = shapes.sphere(1, 1.0)
+    found = reached(ball, np.zeros((2, 3)), np.array([np.inf, 1.0]))
+    assert found.tolist() == list(range(len(ball.triangles)))
+    assert len(reached(ball, np.zeros((0, 3)), np.zeros(0))) == 0
+
+
+def test_a_negative_vertex_number_is_refused() -> None:
+    with pytest.raises(ValueError, match="a triangle has a negative vertex number"):
+        parts_of(Surface(FLAT, np.array([[0, -1, 2]])))

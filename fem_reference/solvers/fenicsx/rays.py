@@ -23,6 +23,8 @@ _SHALLOW, _NEAR = 0.25, 0.4
 _STAYS = 4.0  # beyond edges, the facet of the last search is taken unless another has this times its pressure
 _ON = 1e-7  # a place is on a facet up to this distance beyond its edges, in reference coordinates
 _AT = 0.02  # the same for the place nearest to a point
+# A point is in contact with this share of its pressure, or up to this times the depth under its pressure beyond the smoothing.
+_HALF, _YIELDS = 0.5, 2.0
 
 
 def _step(x: Floats) -> tuple[Floats, Floats]:
@@ -165,6 +167,11 @@ class RayPass(Pass):
         assert isinstance(met, Hits)  # found by ``met``
         return met.left * facing(met.here, met.there)[0] * self._ends(met.there.at, met.gap, met.facets)[0]
 
+    def depth(self, met: Met) -> float:
+        """The greatest depth [mm] of points on facets, normal to these."""
+        cosine, on = -np.vecdot(met.here.normal, met.there.normal), self.other.beyond(met.there.at) <= _ON
+        return float((-met.gap * cosine)[on].max(initial=0.0))
+
     def pressed(self, met: Met) -> PressedPoints:
         """The contact of hits: the force of the pressure along the own normal."""
         assert isinstance(met, Hits)  # found by ``met``
@@ -203,12 +210,15 @@ class RayPass(Pass):
         return PressedPoints(dofs, rows, np.zeros((len(of), 4)), second, np.zeros((len(of), 3)))
 
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
-        """The points (k,) that went through, as in ``Pass``, also without those that ``Pass`` would meet no deeper than contact is,
-        as their lines are grazing or blocked; and without those that end in front of the nearest place, and face it: they slid
-        round an edge.
+        """The points (k,) that went through, as in ``Pass``. Points that ``met`` the other side are in contact if they have at
+        least half of their pressure; others, and points that ``Pass`` would meet, only to a depth that fits their pressure. Points
+        that end in front of the nearest place and face it are not lost: they slid round an edge.
         """
-        near, deep = Pass.met(self, now, self.law.smoothing, None, (before, last)), self.law.smoothing + self.depth(met)
-        lost = self._passed_by(before, last, now, np.union1d(near.points[near.gap > -deep], met.points), deep)
+        deep = np.full(len(self.areas), self.law.smoothing)
+        np.maximum.at(deep, met.points, self.law.smoothing + _YIELDS / self.law.stiffness * self.pressure(met)[0])
+        near = Pass.met(self, now, self.law.smoothing, None, (before, last))
+        held = near.points[near.gap > -deep[near.points]]
+        lost = self._passed_by(before, last, now, np.union1d(held, met.points[self.shares(met) >= _HALF]), deep)
         nodes, points = self.other.nodes(now), self.places(now)[lost]
         middles, radii = self.other.balls(nodes)
         some, facets = pairs(points, middles, 2 * radii)

@@ -85,7 +85,7 @@ class TouchingForces:
         for (law, one, other), around in zip(sides, skins, strict=True):
             felt = law.around and len(around) > 0
             skin = facets(np.concatenate([form.regions[other], around])) if felt else own[other]
-            kind = RayPass if law.along_normals else Pass
+            kind = RayPass if law.own_normals else Pass
             passes.append(kind(law, own[one], skin, (one, other)))
             rims.append(Pass(law, own[one], facets(around), (one, other)) if len(around) and not felt else None)
         return passes, rims

@@ -231,8 +231,8 @@ class Pass:
         return dofs.reshape(len(dofs), 3 * dofs.shape[1])
 
     def depth(self, met: Met) -> float:
-        """The greatest depth [mm] of the points that ``met`` the other side, less where their pressure fades."""
-        return float((-met.gap * self.shares(met)).max(initial=0.0))
+        """The greatest depth [mm] of the points that ``met`` the other side."""
+        return float((-met.gap).max(initial=0.0))
 
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
         """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), without those that ``met``
@@ -240,10 +240,10 @@ class Pass:
         flat pieces of a facet may be in front, are also followed from in front, raised by at most the facet's reach, within which
         points are met. Points that end in front of a facet passed only its flat pieces.
         """
-        return self._passed_by(before, last, now, met.points, 0.0)
+        return self._passed_by(before, last, now, met.points, np.zeros(len(self.areas)))
 
-    def _passed_by(self, before: Floats, last: Met, now: Floats, seen: Ints, deep: float) -> Ints:
-        """The points as in ``through``, without those ``seen``, or facing away from a facet at most ``deep`` [mm] before them."""
+    def _passed_by(self, before: Floats, last: Met, now: Floats, seen: Ints, deep: Floats) -> Ints:
+        """The points as in ``through``, without those ``seen``, or up to ``deep`` (n,) [mm] behind a facet they do not face."""
         starts, ends = self.places(before), self.places(now)
         free = np.ones(len(ends), bool)
         free[seen], none = False, np.zeros(0, np.int64)
@@ -261,7 +261,7 @@ class Pass:
         gap, on = np.vecdot(ends[points] - there.point, there.normal), self.other.beyond(there.at) <= _BEYOND
         here = self._here(self.side.nodes(now), points)
         beside = np.vecdot(here.normal, there.normal) > -GRAZING
-        safe = (gap > 0) | (beside & (gap > -deep))
+        safe = (gap > 0) | (beside & (gap > -deep[points]))
         return np.unique(points[np.where(first, on & ~safe & (gap < 0), ~(on & safe))])
 
     def _reach(self, nodes: Floats) -> Floats:

@@ -7,7 +7,15 @@ pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCS
 
 from fem_reference.solvers.fenicsx.rays import Hits, RayPass, facing
 from fem_reference.solvers.fenicsx.touching import TouchingForces
-from tests.solvers.fenicsx.test_touching_passes import KINDS, K, crumpled, nearest, over_a_block, residual
+from fem_reference.solvers.fenicsx.touching_passes import Pass
+from tests.solvers.fenicsx.test_touching_passes import KINDS, K, crumpled, over_a_block, residual
+
+
+def measured(contact: TouchingForces, kind: type[Pass] = RayPass) -> None:
+    """Let a ``contact`` measure gaps along own normals, or to the nearest place."""
+    contact.passes = [kind(one.law, one.side, one.other, one.names) for one in contact.passes]
+    contact.seen[:], contact.now = np.nan, []
+    contact.settle()
 
 
 def hits(contact: TouchingForces, one: int = 1) -> Hits:
@@ -21,6 +29,7 @@ def hits(contact: TouchingForces, one: int = 1) -> Hits:
 @pytest.mark.parametrize("rough", [1, 5])
 def test_forces_balance_and_their_tangent_is_exact(element, rough) -> None:
     contact, displacement = crumpled(element)
+    measured(contact)
     unknowns, dofs = contact.unknowns.x.array, displacement.dofs
     unknowns *= rough
     forces, tangent, start = residual(contact), contact.tangent(), np.array(unknowns)
@@ -67,6 +76,7 @@ def test_forces_are_continuous_across_a_ridge_and_a_sharp_edge(element, slope) -
     change by a tenth. To the nearest place, they jump.
     """
     contact, upper = over_a_block(element)
+    measured(contact)
     one = contact.passes[1]
     contact.unknowns.x.array[one.other.dofs[..., 2]] = -slope * np.maximum(one.other.rest[..., 0] - 0.5, 0)
     for ends in ((0.3, 0.7), (0.2, -0.3)):
@@ -75,7 +85,7 @@ def test_forces_are_continuous_across_a_ridge_and_a_sharp_edge(element, slope) -
         assert few > 1e-6
         assert many < 0.2 * few
     path = tuple(np.array([x - 0.5, 0.0, 0.48 - 1.5]) for x in (0.2, -0.3))
-    nearest(contact)
+    measured(contact, Pass)
     few, many = (greatest_jump(contact, upper, count, path) for count in (60, 600))
     assert many > 0.5 * few
 
@@ -84,6 +94,7 @@ def test_contact_fades_where_places_do_not_face_a_point() -> None:
     """A plate is 0.02 deep in a flat block that is turned beneath it: the pressure is the law's, by the length of the line."""
     for slope, share in ((0.0, 1.0), (0.9, 1.0), (4.0, 0.0)):
         contact, upper = over_a_block("P2/P1")
+        measured(contact)
         one, unknowns = contact.passes[1], contact.unknowns.x.array
         unknowns[one.other.dofs[..., 2]] = slope * (one.other.rest[..., 0] - 0.5)
         unknowns[upper] = [0.0, 0.0, -1.02]
@@ -98,6 +109,7 @@ def test_contact_fades_where_places_do_not_face_a_point() -> None:
 def test_the_first_crossing_decides() -> None:
     """Points below a block are not in it, although the line behind them meets its top from below; from inside, they are in it."""
     contact, upper = over_a_block("Q1/P0")
+    measured(contact)
     one, unknowns = contact.passes[1], contact.unknowns.x.array
     unknowns[upper] = [0.0, 0.0, -1.1]
     assert len(hits(contact).points) == len(one.areas)
@@ -115,6 +127,7 @@ def test_points_that_slide_round_an_edge_are_not_lost_and_those_that_go_through_
     """The plate begins on the left side of a ridge of 90 degrees, and ends in front of its right side, or below both."""
     for end, went in (([0.3, 0.0, -1.2], False), ([0.1, 0.0, -2.4], True)):
         contact, upper = over_a_block(element)
+        measured(contact)
         one, unknowns = contact.passes[1], contact.unknowns.x.array
         unknowns[one.other.dofs[..., 2]] = -np.abs(one.other.rest[..., 0] - 0.5)
         unknowns[upper] = [-0.1, 0.0, -1.09]

@@ -16,7 +16,6 @@ from fem_reference.problems.touching import Touching
 from fem_reference.solvers.fenicsx import meshes
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.touching import TouchingForces
-from fem_reference.solvers.fenicsx.touching_passes import Pass
 
 K, D = 2.0, 0.05
 KINDS = {
@@ -51,14 +50,6 @@ def contact_of(mesh: Cells, law: Touching, element: str) -> tuple[TouchingForces
     return TouchingForces(body, SimpleNamespace(regions=regions), displacement, Spent()), displacement
 
 
-def nearest(contact: TouchingForces) -> TouchingForces:
-    """The ``contact`` with the nearest places, as under friction, but without friction."""
-    contact.passes = [Pass(one.law, one.side, one.other, one.names) for one in contact.passes]
-    contact.seen[:], contact.now = np.nan, []
-    contact.settle()
-    return contact
-
-
 def energy(contact: TouchingForces) -> float:
     """The integral of the law's pressure over the gap, summed over the points of both sides."""
     contact.look()
@@ -78,7 +69,6 @@ def residual(contact: TouchingForces) -> np.ndarray:
 @pytest.mark.parametrize("element", KINDS)
 def test_forces_are_the_slope_of_the_energy_and_the_tangent_theirs(element) -> None:
     contact, displacement = crumpled(element)
-    nearest(contact)
     unknowns, dofs = contact.unknowns.x.array, displacement.dofs
     forces, tangent = residual(contact), contact.tangent()
     assert min(len(met.gap) for met, _ in contact.now) > 5
@@ -140,7 +130,6 @@ def test_friction_balances_and_its_tangent_is_exact(element) -> None:
 def test_points_that_face_the_same_way_do_not_meet() -> None:
     # The top of the upper box is behind the facets of the lower one once this box is moved into the lower one, far enough.
     contact, _ = crumpled("Q1/P0")
-    nearest(contact)
     first = contact.passes[0]
     met = first.met(contact.unknowns.x.array, D)
     normals = np.einsum("ni,ni->n", met.here.normal, met.there.normal)
@@ -151,7 +140,6 @@ def test_points_that_face_the_same_way_do_not_meet() -> None:
 
 def test_a_point_stays_on_its_facet_a_little_beyond_the_edge() -> None:
     contact, _ = crumpled("P1/P1")
-    nearest(contact)
     one, unknowns = contact.passes[0], contact.unknowns.x.array
     first = one.met(unknowns, D)
     assert (one.other.beyond(first.there.at) <= 0.02).all()
@@ -197,7 +185,6 @@ def over_a_block(element: str) -> tuple[TouchingForces, np.ndarray]:
 def test_a_point_stays_on_its_facet_unless_another_is_nearer_by_more_than_the_smoothing(element) -> None:
     # The top of the block falls by 45 degrees to both sides of a ridge along x = 0.5. The plate comes 0.1 below the ridge.
     contact, upper = over_a_block(element)
-    nearest(contact)
     unknowns, one = contact.unknowns.x.array, contact.passes[1]
     unknowns[one.other.dofs[..., 2]] = -np.abs(one.other.rest[..., 0] - 0.5)
     for x in (0.03, -0.01):  # first below the right side alone
@@ -218,7 +205,6 @@ def test_a_nearer_facet_just_beyond_its_edge_comes_before_a_deeper_one(element, 
     begin in contact with the right side, if ``held``, or without contact.
     """
     contact, upper = over_a_block(element)
-    nearest(contact)
     unknowns, one = contact.unknowns.x.array, contact.passes[1]
     x, y = one.other.rest[..., 0], one.other.rest[..., 1]
     unknowns[one.other.dofs[..., 2]] = -np.abs(x - 0.5)
@@ -278,7 +264,6 @@ def test_a_point_that_leaves_a_narrow_valley_past_its_end_is_not_lost(element) -
     wall passes the right one.
     """
     contact, upper = over_a_block(element)
-    nearest(contact)
     unknowns, one = contact.unknowns.x.array, contact.passes[1]
     unknowns[one.other.dofs[..., 2]] = 10 * np.abs(one.other.rest[..., 0] - 0.5)
     unknowns[upper] = [-0.09, 0.013 - 0.32, -0.5]
