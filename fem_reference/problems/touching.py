@@ -66,7 +66,9 @@ def pressure_name(one: str, other: str) -> str:
 def with_itself(acting: Sequence[Effect], part: str) -> tuple[Touching, ...]:
     """The contact of a ``part`` with itself, if the effects ``acting`` in a single muscle include it."""
     law = among(acting)
-    return () if law is None else (Touching(part, part, law.stiffness, law.smoothing, law.friction),)
+    if law is None:
+        return ()
+    return (Touching(part, part, law.stiffness, law.smoothing, law.friction, own_normals=law.own_normals),)
 
 
 def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[str, Ints], *, moved: bool) -> None:

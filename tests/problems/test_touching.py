@@ -70,4 +70,8 @@ def test_a_part_with_itself_feels_no_pressure_at_rest() -> None:
         check(moved[1], "P1")
     effect = fr.make_effect("touching", stiffness=2.0, smoothing=0.1, friction=0.2)
     assert with_itself((effect,), "free") == (fr.Touching("free", "free", 2.0, 0.1, 0.2),)
+    # Behind a part that touches itself is this part: it is refused, not ignored.
+    lines = fr.make_effect("touching", stiffness=2.0, smoothing=0.1, own_normals=True)
+    with pytest.raises(fr.InputError, match=r"touching\[0\]\.own_normals: got True for a part that touches itself"):
+        check(replace(body(itself), touching=with_itself((lines,), "low_z1")), "P1")
     assert with_itself((), "free") == ()
