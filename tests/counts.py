@@ -198,7 +198,7 @@ ADDED = {
     "fibres by area, their ends on bones": 490,
     "regions, membranes, tendons that pull": 880,
     "contact between parts of the surface": 740,
-    "contact along the points' own normals, which does not jump at edges": 300,
+    "contact along the points' own normals, an option": 320,
     "several muscles in one scene": 1200,
     "exports of several muscles, the depth of muscles in each other": 250,
     "friction": 690,
