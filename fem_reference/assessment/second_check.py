@@ -11,7 +11,6 @@ from pathlib import Path
 from fem_reference.assessment import neighbours, run_checks
 from fem_reference.assessment.body_balance import balance
 from fem_reference.assessment.run_checks import Nodes, RunCheck, RunChecks, of_body, of_muscle, worst
-from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
 from fem_reference.geometry import interpenetration
 from fem_reference.io.texts import plain
@@ -44,8 +43,9 @@ def confirmed_run(problem: Callable[[], MuscleProblem | MusclesProblem], run: Ru
     if stored.get("code") == code:
         return run
     begin, message = time.process_time(), stored.get("message", run.outcome.message)
-    checks = _of_all(problem(), run, lambda number: None if run.folder is None else places(run.folder, number)[1])
-    outcome = confirmed(replace(run.outcome, status="converged", message=message), checks)
+    whole = replace(run.outcome, status="converged", message=message)
+    checks = _of_all(problem(), replace(run, outcome=whole))
+    outcome = confirmed(whole, checks)
     facts = [plain(one) | {"met": one.met} for one in checks]
     seconds = time.process_time() - begin
     origin = run.origin | {RECORD: {"code": code, "message": message, "seconds": seconds, "checks": facts}}
@@ -55,21 +55,26 @@ def confirmed_run(problem: Callable[[], MuscleProblem | MusclesProblem], run: Ru
     return replace(run, outcome=outcome, origin=origin)
 
 
-def _of_all(problem: MuscleProblem | MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
-    """The checks of a muscle's ``run``; for several muscles, the checks of each under its name, and that none is inside another."""
+def trusted(problem: Callable[[], MuscleProblem | MusclesProblem], run: Run) -> bool:
+    """True for a run that converged, and for one that ended early if the frames that it reached pass the second check."""
+    status = run.outcome.status
+    return status == "converged" or (status != "denied" and all(one.met for one in _of_all(problem(), run)))
+
+
+def _of_all(problem: MuscleProblem | MusclesProblem, run: Run, nodes: Nodes | None = None) -> RunChecks:
+    """The checks of a muscle's ``run``, which may have ended early; for several muscles, the checks of each under its name, and
+    that none is inside another. ``nodes``: by default those in the folder of the run.
+    """
+    at = nodes or (lambda number: None if run.folder is None else places(run.folder, number)[1])
     if isinstance(problem, MuscleProblem):
-        return of_muscle(problem, run, nodes)
+        ended = run.outcome.status != "converged"
+        return of_muscle(replace(problem, frames=problem.frames[: len(run.numbers)]) if ended else problem, run, at)
     found = list[RunCheck]()
     for span in problem.spans:
-        part = problem.problems[span.name]
-        own = partial(_some, nodes, span.points)
-        checks = of_muscle(part, run_of(run, problem, span.name), own)
+        own = partial(lambda points, number: None if (all_ := at(number)) is None else all_[points], span.points)
+        checks = _of_all(problem.problems[span.name], run_of(run, problem, span.name), own)
         found += [replace(one, name=f"{span.name}: {one.name}") for one in checks]
-    return (*found, *neighbours.between(problem, run, nodes))
-
-
-def _some(nodes: Nodes, points: slice, number: int) -> Floats | None:
-    return None if (found := nodes(number)) is None else found[points]
+    return (*found, *neighbours.between(problem, run, at))
 
 
 def confirmed_frames(

@@ -212,19 +212,17 @@ def safety(bench: Bench[MuscleCase]) -> float:
     of the smallest attachment if it is above 1. Nested tetrahedra share the polygonal outline of an attachment, so their
     difference does not show its error.
     """
-    rest, radii = bench.setup(), [math.inf]
-    for entry in rest.attached:
-        area = attached_area(rest.surface, attached_shares(rest.surface, entry.vertices))
-        radii.append(math.sqrt(area / math.pi))
-    return SAFETY * max(1.0, bench.scene.muscle.tet_size / min(radii))
+    surface, attached = bench.setup().surface, bench.setup().attached
+    areas = [attached_area(surface, attached_shares(surface, entry.vertices)) for entry in attached]
+    radius = math.sqrt(min(areas, default=math.inf) / math.pi)
+    return SAFETY * max(1.0, bench.scene.muscle.tet_size / radius)
 
 
 def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
     """The case with larger tetrahedra, and the sizes [mm] of its own and of the larger tetrahedra."""
     size, refinements = case.muscle.tet_size, case.muscle.refinements
     if refinements:
-        larger = on_tetrahedra(case, refinements=refinements - 1)
-        return larger, (size / 2**refinements, size / 2 ** (refinements - 1))
+        return on_tetrahedra(case, refinements=refinements - 1), (size / 2**refinements, size / 2 ** (refinements - 1))
     return on_larger(case, RATIO), (size, size * RATIO)
 
 
@@ -238,7 +236,7 @@ def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) 
         raise InputError(f"error bar, {name}", got, "a finer reference") from error
     if run.outcome.status != "converged":
         log.info("error bar: %s: %s, %s", name, run.outcome.status, run.outcome.message)
-    return other, complete(run, reference.numbers, trusted=run.outcome.status != "denied")
+    return other, complete(run, reference.numbers, trusted=second_check.trusted(other.problem, run))
 
 
 def _of(reference: Run) -> dict[str, str]:
@@ -250,10 +248,8 @@ def _of(reference: Run) -> dict[str, str]:
 @cache
 def _measuring_hash() -> str:
     """A hash over the source files by which runs are measured."""
-    digest = hashlib.sha256()
-    for path in (*sorted(Path(metrics.__file__).parent.glob("*.py")), *MAKING):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    paths = (*sorted(Path(metrics.__file__).parent.glob("*.py")), *MAKING)
+    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()[:16]
 
 
 def tets(run: Run, fact: str = "tets") -> float:
@@ -295,5 +291,4 @@ def sharper_problem(
     if quadratic is not None:
         changes |= {"element": quadratic, "quadrature_degree": None}
         return body, np.arange(len(body.mesh.points)), changes, f"{quadratic} on the same cells{said}"
-    other, shared = on_finer_cells(body)
-    return other, shared, changes, f"{settings.element} on cells of half the size{said}"
+    return *on_finer_cells(body), changes, f"{settings.element} on cells of half the size{said}"

@@ -106,7 +106,7 @@ def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> Non
     assert "error bars of the reference" in capsys.readouterr().out
     text = page.read_text()
     assert "(9 mm instead of 6 mm)" in text
-    assert "cause of error halved at a time (contact stiffness, contact smoothing and distances to bones)" in text
+    assert "source of error halved at a time (contact stiffness, contact smoothing and distances to bones)" in text
     assert ">error bar</text>" in text
 
 
@@ -171,21 +171,24 @@ def test_a_run_that_failed_has_none(case, monkeypatch) -> None:
     assert (status, facts["error_bars"]) == (cli.SOLVER_FAILED, [])
 
 
-def test_a_coarser_run_that_fails_leaves_frames_without_a_bar(case, monkeypatch) -> None:
+@pytest.mark.parametrize("denied", [False, True])
+def test_a_coarser_run_that_fails_has_bars_at_the_frames_that_it_reached_unless_denied(
+    case, monkeypatch, denied
+) -> None:
     finest = []
 
     def fail(problem, settings, sink) -> Outcome:
         finest.append(problem.mesh_facts["tets"])
-        if problem.mesh_facts["tets"] == finest[0]:
-            return swell(problem, settings, sink)
-        sink(Frame(0, problem.surface.points, problem.fibres.points))
-        return Outcome("diverged", "no")
+        whole = problem.mesh_facts["tets"] == finest[0]
+        swell(problem, settings, lambda frame: sink(frame) if whole or frame.number <= 10 else None)
+        return Outcome("converged" if whole else "diverged", "so it ended")
 
     stand_ins.solve_by(monkeypatch, fenicsx, fail)
-    stand_ins.unchecked(monkeypatch)
+    if denied:
+        stand_ins.deny_further_runs(monkeypatch)
     _, facts = call(case, "run", "--error-bar")
     values = rows(facts, "change", "surface_deviation", "max")
-    assert values.tolist()[1:] == [None] * 4
+    assert [value is None for value in values[1:]] == [denied, denied, True, True]
     assert (facts["verdict"], facts["verdicts"][0]["error_bar"]) == ("inconclusive", None)
 
 
