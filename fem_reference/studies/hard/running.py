@@ -34,6 +34,8 @@ from fem_reference.studies.law_split import LAW
 
 log = logging.getLogger(__name__)
 
+# The least time [s] after which a limit fires again: not while the first exception ends the work.
+_AGAIN = 1.0
 LONGER = 600.0  # the limit of processor time [s] of a case's runs in several numbers of load steps or on several meshes
 # The pattern by which messages state a place at rest [mm].
 _PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
@@ -153,7 +155,7 @@ def _limited(seconds: float) -> Iterator[None]:
     before = [signal.signal(number, handler) for _, number, handler, _ in timers]
     try:
         for timer, _, _, longer in timers:
-            signal.setitimer(timer, longer * seconds, longer * seconds)
+            signal.setitimer(timer, longer * seconds, max(longer * seconds, _AGAIN))
         yield
     finally:
         for (timer, number, _, _), handler in zip(timers, before, strict=True):
