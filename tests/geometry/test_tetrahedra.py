@@ -198,7 +198,7 @@ def test_what_gmsh_says_is_passed_on() -> None:
         "two.ply",
     )
     with pytest.raises(
-        InputError, match=r"two.ply: got a surface that gmsh refuses \(Exception: .+\), want a clean surface"
+        InputError, match=r"two.ply: got a surface that gmsh rejects \(Exception: .+\), want a clean surface"
     ):
         tetrahedra.run("gmsh", twice, 16.0)
 

@@ -104,7 +104,7 @@ def test_the_reference_says_what_a_text_may_be() -> None:
     text = reference_pages.scenes()
     muscle = text.partition("### MuscleOfSeveral")[2].partition("###")[0]
     assert "| `name` | a name of 1 to 100 letters, digits and _ -, without a dot | required |" in muscle
-    assert "| `unsolved` | text |" in text
+    assert "| `unsolved` | string |" in text
     formulas = re.findall(r"^\| `(exact|slope|value|where)` \| a number, or a formula of x, y, z", text, re.MULTILINE)
     assert len(formulas) == 4
 
