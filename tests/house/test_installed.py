@@ -92,5 +92,5 @@ def test_a_package_that_is_missing_is_no_mistake_of_ours() -> None:
     without = "import sys; sys.modules['numpy'] = None; from fem_reference import cli; sys.exit(cli.main(['list']))"
     done = subprocess.run([sys.executable, "-c", without], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 70
-    assert f"the Python package numpy is not installed for {sys.executable}: pip install" in done.stderr
+    assert f"the Python package numpy is not installed for {sys.executable}: use its pip to install" in done.stderr
     assert "an error in fem-reference itself" not in done.stderr
