@@ -123,7 +123,7 @@ def test_what_all_do_alike_is_no_travel_and_the_rest_is_bounded_by_the_size() ->
         (lambda points, _: points[:, 0], r'"head": path at frame 0: got displacements \(4,\) of points \(4, 3\)'),
         (lambda points, _: points @ [1.0], r'"head": path at frame 0: got ValueError: matmul'),
         (Turn((0, 0, 1), 1e300), r'"head": path: got 1e\+300 rad of turning, want at most 3927 rad'),
-        (Affine(STILL, (0.0, 0.0, 1e300)), r'"head": path at frame 0: got .* mm up to frame .*, want one without'),
+        (Affine(STILL, (0.0, 0.0, 1e300)), r'"head": path at frame 0: got .* mm up to frame .*, want a path without'),
     ],
 )
 def test_what_nobody_can_follow_is_refused(path, message) -> None:

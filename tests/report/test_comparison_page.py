@@ -67,7 +67,7 @@ def test_how_well_the_reference_is_known_is_reported(comparison):
         "The last column is the change of a statistic with another model of the attachments: with exact attachments"
         in text
     )
-    assert "cause of error halved at a time (load steps)" in text
+    assert "source of error halved at a time (load steps)" in text
     assert "--error-bar" not in text
     # The worst frame of "quick" is the last, where the bar is not known; that of "torn" is the one before.
     assert '<small>± <span class="bad">not a number</span>' in text
