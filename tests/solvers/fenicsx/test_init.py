@@ -59,9 +59,9 @@ def test_both_ends_moved_alike_is_a_rigid_motion() -> None:
     [
         (
             {"element": "P1"},
-            'element: got "P1", want one for tetrahedron cells with a pressure, which an effect brings',
+            'element: got "P1", want an element for tetrahedron cells with a pressure, which an effect brings',
         ),
-        ({"element": "Q2/Q1"}, 'element: got "Q2/Q1", want one for tetrahedron cells with a pressure'),
+        ({"element": "Q2/Q1"}, 'element: got "Q2/Q1", want an element for tetrahedron cells with a pressure'),
         ({"element": "P1/P1", "quadrature_degree": 1}, "quadrature_degree: got 1, want 2 or more for P1/P1"),
     ],
 )
@@ -73,7 +73,7 @@ def test_a_problem_made_in_python_is_refused_as_a_case_is(given, wanted) -> None
 
 def test_a_pressure_that_no_effect_brings_is_refused() -> None:
     problem = shapes.bar((1, 1, 1), (10, 10, 20), {"bottom": None, "top": None}, MUSCLE[:1], (0,))
-    with pytest.raises(InputError, match=r'element: got "P2/P1", want one for .* without a pressure'):
+    with pytest.raises(InputError, match=r'element: got "P2/P1", want an element for .* without a pressure'):
         solved(problem, element="P2/P1")
 
 

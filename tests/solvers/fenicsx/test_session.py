@@ -24,7 +24,7 @@ fenicsx_only = pytest.mark.skipif(not installed(), reason="FEniCSx is not instal
 
 
 def test_a_session_checks_the_element(session) -> None:
-    with pytest.raises(InputError, match="want one for tetrahedron cells"):
+    with pytest.raises(InputError, match="want an element for tetrahedron cells"):
         session.solve(Body(box("P1"), FLESH, (), (0.0, 1.0)), settings("Q1/P0"))
 
 
