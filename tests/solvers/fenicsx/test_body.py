@@ -53,7 +53,7 @@ def test_an_element_must_exist_and_fit_the_cells_and_the_effects() -> None:
         check(body, "P3")
     with pytest.raises(
         InputError,
-        match='element: got "Q1/P0", want one for tetrahedron cells with a pressure, which an effect brings: P1/P1, P2/P0, P2/P1',
+        match='element: got "Q1/P0", want an element for tetrahedron cells with a pressure, which an effect brings: P1/P1, P2/P0, P2/P1',
     ):
         check(body, "Q1/P0")
     with pytest.raises(
