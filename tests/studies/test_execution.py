@@ -79,7 +79,7 @@ def test_an_element_that_does_not_suit_the_effects_is_named(tmp_path) -> None:
     bench = Bench(scene, tmp_path / "runs")
     for element, want in (("Q2/Q1", "P1/P1, P2/P0, P2/P1"), ("P1", "P1/P1, P2/P0, P2/P1")):
         with pytest.raises(
-            InputError, match=rf'case.toml: reference.element: got "{element}", want one for .*: {want}'
+            InputError, match=rf'case.toml: reference.element: got "{element}", want an element for .*: {want}'
         ):
             bench.settings(SolverChoice(solver="fenicsx", element=element), "reference")
 
