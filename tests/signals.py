@@ -2,6 +2,7 @@
 
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -11,12 +12,17 @@ from fem_reference.foundations import signals
 @contextmanager
 def listening() -> Iterator[None]:
     """A context in which signals are heard as by the command."""
-    before, hook = signal.getsignal(signal.SIGTERM), sys.unraisablehook
+    before, hook = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}, sys.unraisablehook
     try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it is ignored
         signals.listen()
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number in before:
+            signal.signal(number, signal.SIG_IGN)
+        time.sleep(0.1)  # a repeated signal that is on its way would end the tests
+        for number, handler in before.items():
+            signal.signal(number, handler)
         sys.unraisablehook = hook
 
 

@@ -51,5 +51,7 @@ def test_a_membrane_is_refused():
         (),
         (0, 1),
     )
-    with pytest.raises(InputError, match="effects: got membrane, want effects without"):
+    with pytest.raises(
+        InputError, match="effects: got membrane, want other effects: this solver has no surface energies"
+    ):
         solve_body(body, ScikitBodySettings(element="P2"))
