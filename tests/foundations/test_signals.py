@@ -33,7 +33,7 @@ def test_a_signal_lost_in_a_deletion_raises_all_the_same(number, raised) -> None
 
 
 def test_a_signal_lost_in_a_callback_raises_all_the_same() -> None:
-    things = [Losing(signal.SIGURG)]  # a signal that is ignored
+    things = [{1}]
     _kept = weakref.ref(things[0], lambda _: signal.raise_signal(signal.SIGTERM))
 
     def call_back() -> None:
