@@ -19,8 +19,7 @@ def listen() -> None:
     before = sys.unraisablehook
 
     def lost(found: "sys.UnraisableHookArgs") -> None:
-        ours = found.exc_type is KeyboardInterrupt or getattr(found.exc_value, "code", None) == TERMINATED
-        if ours and found.exc_type in _RAISED:
+        if found.exc_type in _RAISED and getattr(found.exc_value, "code", TERMINATED) == TERMINATED:
             with suppress(RuntimeError):  # the interpreter ends
                 threading.Timer(_AGAIN, os.kill, (os.getpid(), _RAISED[found.exc_type])).start()
         else:

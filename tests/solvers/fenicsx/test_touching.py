@@ -217,3 +217,35 @@ def test_contact_along_own_normals_has_two_parts_no_friction_and_no_stability() 
             InputError, match=r"touching\[0\]\.own_normals: got True .*, want two parts without friction"
         ):
             fenicsx.solve_body(replace(body, touching=(wrong,)), fenicsx.BodySettings(element="Q1/P0"))
+
+
+def steep(edges: np.ndarray, faces: str) -> Cells:
+    """A block with these ``edges`` (3, 3), the part "tip" of three faces or two that meet in front, and "top" of those behind."""
+    found = block((2, 2, 2), (0.4, 0.4, 0.4))
+    names = {
+        name: np.concatenate([found.facets[f"{face}{end}"] for face in faces]) for name, end in (("tip", 0), ("top", 1))
+    }
+    return replace(placed(found, 0.5, 0.5, 0.501, turn=edges), facets=found.facets | names)
+
+
+@pytest.mark.parametrize("own_normals", [False, True])
+@pytest.mark.parametrize("tip", ["wedge", "corner"])
+def test_a_steep_tip_without_pressure_does_not_converge(tip, own_normals, fem_lab) -> None:
+    """A wedge of a half angle of 22 degrees, and a cube on its corner, stretched to a cosine of 0.33 between its faces and the
+    block below: along own normals, pressure ends at a cosine of 0.3. Pressed in by 0.04 mm, the tip would be all of that deep.
+    """
+    angle, (a, b, c) = np.radians(22), 1 / np.sqrt([2, 6, 3])
+    across, up = np.sin(angle), np.cos(angle)
+    wedge = np.array([[across, 0, up], [0, 1, 0], [-across, 0, up]])
+    corner = np.array([[a, b, 2 * c], [-a, b, 2 * c], [0, -2 * b, 2 * c]])
+    high = steep(wedge, "xz") if tip == "wedge" else steep(corner, "xyz")
+    law = Touching("low_z1", "high_tip", 1.0, 0.005, own_normals=own_normals)
+    body = pair(block((4, 4, 2)), high, 0.0, 0.0, -0.04, law=law)
+    body = replace(
+        body,
+        effects=parts.neo_hooke(0.1, 1.0),
+        prescribed=(*parts.clamped("low_z0"), replace(body.prescribed[-1], on="high_top")),
+    )
+    outcome = solved(fem_lab, body).outcome
+    assert outcome.status == ("diverged" if own_normals else "converged")
+    assert ('a point of "high_tip" that rests at (0.5, 0.5, 0.5) mm' in outcome.message) == own_normals
