@@ -166,14 +166,15 @@ def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iter
     the attached facets. Springs: their mean extension, the force divided by stiffness and area; in situ they carry a force at rest.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
-    facets_away = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
+    facets = Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])
+    facets_away = cache(lambda: distances(rest, facets).distance)
     weights = _areas(problem.surface)[entry.vertices]
     size, forces = diagonal(problem.surface.points), run.scalars.get(f"force_{entry.attachment}")
     at_rest = 0.0 if forces is None or in_situ.among(problem.effects) is None else float(forces[0])
     for i, number in enumerate(run.numbers):
         away = run.positions[i][entry.vertices] - apply(entry.bone.pose(number), rest)
         if entry.stiffness is None:
-            off, allowed = np.linalg.norm(away, axis=1), ROUNDING * size + _STRAIN * facets_away
+            off, allowed = np.linalg.norm(away, axis=1), ROUNDING * size + _STRAIN * facets_away()
             places = run.positions[i][entry.vertices]
             yield _at(f"{entry.attachment} away from {entry.bone.name}", off, allowed, number, places)
         elif forces is not None and skin is not None:

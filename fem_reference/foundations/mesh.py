@@ -26,8 +26,9 @@ TET_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
 def read_only(values: Any, dtype: type) -> NDArray[Any]:
-    """A read-only copy of ``values``."""
-    array: NDArray[Any] = np.array(values, dtype=dtype, order="C")
+    """A read-only copy of ``values``, or ``values`` that are such an array."""
+    kept = isinstance(values, np.ndarray) and values.flags.owndata and not values.flags.writeable
+    array: NDArray[Any] = np.array(values, dtype=dtype, order="C", copy=None if kept else True)
     array.setflags(write=False)
     return array
 

@@ -81,7 +81,7 @@ def reached(surface: Surface, points: Floats, reach: Floats) -> Ints:
 
 def _moderate(*places: Floats) -> bool:
     """True if all coordinates are finite and below ``_FARTHEST``, so that differences do not overflow."""
-    return all(np.abs(some).max(initial=0.0) < _FARTHEST for some in places)
+    return all(some.min(initial=0.0) > -_FARTHEST and some.max(initial=0.0) < _FARTHEST for some in places)
 
 
 @lru_cache(maxsize=16)

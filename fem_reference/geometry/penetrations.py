@@ -75,7 +75,7 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
     def into_body(points: Floats) -> Floats:  # in the frame of the body, whose search tree serves all bones
         return depths_within(body, apply(pose, points), of_body)
 
-    tips, bone_tips = (_tips(surface, crossing) for surface, crossing in ((local, of_body), (bone, of_bone)))
+    tips, bone_tips = (_tips(surface, crossing) for surface, crossing in ((body, of_body), (bone, of_bone)))
     first = _of_surface(local, of_body, into_bone, tips, into_bone(local.points[tips]) > 0)
     second = _of_surface(bone, of_bone, into_body, bone_tips, _inside(body, apply(pose, bone.points[bone_tips])))
     count = len(local.points) + len(local.triangles)
@@ -159,7 +159,9 @@ def _flood(deep: NDArray[np.bool_], triangles: Ints, crossing: Ints) -> None:
 def _tips(surface: Surface, crossing: Ints) -> Ints:
     """A vertex of each part of a surface without triangles ``crossing`` another surface: the whole part is on its side."""
     firsts, own = parts_of(surface)
-    return np.setdiff1d(firsts, own[surface.triangles[crossing, 0]])
+    crossed = np.zeros(len(own), bool)
+    crossed[own[surface.triangles[crossing, 0]]] = True
+    return firsts[~crossed[firsts]]
 
 
 class Shared(NamedTuple):

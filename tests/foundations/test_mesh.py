@@ -117,6 +117,16 @@ def test_records_keep_read_only_copies() -> None:
     ):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
+    assert surface.moved_to(CORNER + 1).triangles is surface.triangles
+
+
+def test_a_read_only_view_of_what_may_change_is_copied() -> None:
+    points = CORNER.copy()
+    view = points[:]
+    view.setflags(write=False)
+    surface = Surface(view, TET_FACES)
+    points[:] = np.nan
+    assert_array_equal(surface.points, CORNER)
 
 
 def test_a_fingerprint_sees_values_shapes_types_and_order() -> None:
