@@ -10,7 +10,7 @@ import numpy as np
 
 from fem_reference.effects import in_situ, touching
 from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, place_of, vertex_areas
-from fem_reference.foundations.motion import apply
+from fem_reference.foundations.motion import RigidMotion, apply
 from fem_reference.geometry.distance import distances, flattened
 from fem_reference.geometry.penetrations import Depths, depths
 from fem_reference.geometry.signed_distance import Grid
@@ -195,15 +195,13 @@ def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
             turns = bone.motion is not None and bone.motion.centre is not None
             if bone.motion is None or (alike and not turns):
                 continue
-            travelled = _travel(bone, before, number) / float(counts[i])
+            travelled = _travel(bone.motion, before, number) / float(counts[i])
             word, allowed, unit = ("rotation", _TURN, "rad") if turns else ("travel", farthest, "mm")
             yield RunCheck(f"{word} of {bone.name} per load step", travelled, allowed, unit, number)
 
 
-def _travel(bone: Bone, before: float, after: float) -> float:
+def _travel(motion: RigidMotion, before: float, after: float) -> float:
     """Travel of a bone between two frames [rad or mm]; in a motion out and back both directions count."""
-    motion = bone.motion
-    assert motion is not None  # called for moving bones only
     stops = [before, *(frame for frame in motion.frames if before < frame < after), after]
     return float(np.abs(np.diff(np.interp(stops, motion.frames, motion.amounts))).sum())
 

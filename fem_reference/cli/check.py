@@ -6,6 +6,7 @@ file call such a result inconclusive, the JUnit file skipped.
 
 import argparse
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from fem_reference.assessment import baseline, regression
@@ -15,7 +16,7 @@ from fem_reference.cli._cases import checked_bench, choose, scene_of
 from fem_reference.cli._parser import share
 from fem_reference.report import regression_texts
 from fem_reference.scenes import casefile
-from fem_reference.studies import refinement
+from fem_reference.studies import arguments, by_muscle, muscle_bars
 
 HELP = "judge a candidate against its earlier results and against the reference, for continuous integration"
 
@@ -25,6 +26,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     either = "a candidate of the case or a folder of frames"
     parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=either)
     share(parser, "--unit")
+    one = "the muscle to judge, in a case of several; the reference solves all of them, a candidate each by itself"
+    parser.add_argument("--muscle", default="", metavar="NAME", help=one)
     past = "JSON file of the candidate's earlier measures"
     parser.add_argument("--baseline", type=Path, required=True, metavar="FILE", help=past)
     anew = "rewrite the baseline from the current measures; its tolerances and limits stay"
@@ -37,13 +40,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Judge a candidate by its baseline, which ``--update`` writes first."""
     begin = time.perf_counter()
-    scene = casefile.muscle(scene_of(options), "CASE")
-    entry, place = choose(scene, options.candidate, options.unit)
-    bench = checked_bench(scene, options, [(entry, place)])
+    case, muscle = scene_of(options), options.muscle
+    arguments.check_muscle(muscle, case, "--muscle")
+    if not muscle:
+        casefile.muscle(case, "CASE")
+    entry, place = choose(case, options.candidate, options.unit)
+    whole = checked_bench(case, options, [(entry, place)])
+    bench = whole.parts[muscle] if muscle else whole.of_muscle()
+    scene, entry = bench.scene, by_muscle.of_part(whole.found(entry, place), place, muscle) if muscle else entry
     # Errors of the baseline are reported before anything is solved.
     (baseline.check if options.update else baseline.read)(options.baseline, scene, entry.name)
     candidate = bench.obtain(entry.name, entry, place)  # before the reference, as the candidate may be bad input
-    reference = bench.reference()
+    solved = whole.reference()
+    # With the folder of all muscles: a baseline names it, so that a changed neighbour is reported.
+    reference = replace(by_muscle.split(whole, solved)[muscle], folder=solved.folder) if muscle else solved
     failed = [one for one in (reference, candidate) if one.outcome.status != "converged"]
     if failed:
         why = [f"{one.name}: {one.outcome.status}, {one.outcome.message}" for one in failed]
@@ -53,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
         write(options.markdown, markdown)
         write_output(facts, "\n".join([*why, "verdict: failed"]), options)
         return SOLVER_FAILED
-    bars = refinement.offered(bench, reference, asked=options.error_bar)
+    bars = muscle_bars.offered(whole, solved, muscle, asked=options.error_bar)
     current = CurrentMeasures.of(scene, bench.setup(), candidate, reference, bars)
     if options.update:
         baseline.update(options.baseline, current)

@@ -35,13 +35,12 @@ def is_of_body(reference: object, of: object) -> bool:
     return True
 
 
-def check_muscle(name: object, case: object) -> None:
-    """Raise InputError unless ``name`` is one of several muscles of the ``case``, or empty for any other case or a body."""
+def check_muscle(name: object, case: object, place: str = "muscle") -> None:
+    """Raise InputError at ``place`` unless ``name`` is one of several muscles of the ``case``, or empty for others."""
     names = [one.name for one in case.muscle] if isinstance(case, MusclesCase) else []
     if name not in (names or [""]):
-        raise InputError(
-            "muscle", said(name), f"one of {', '.join(names)}" if names else "none, without several muscles"
-        )
+        got = f'"{name}"' if isinstance(name, str) else said(name)
+        raise InputError(place, got, f"one of {', '.join(names)}" if names else "none, without several muscles")
 
 
 def check_keys(keys: object) -> Sequence[str]:

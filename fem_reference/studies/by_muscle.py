@@ -74,6 +74,15 @@ def split(bench: Bench[Case], reference: Run) -> dict[str, Run]:
     return beside({name: complete(run, numbers) for name, run in bench.by_muscle(reference).items()})
 
 
+def of_part(entry: Candidate, place: str, muscle: str) -> Candidate:
+    """A candidate with its folder, if any, for one ``muscle``; InputError at ``place`` if it has no frames of this muscle."""
+    found = _own((entry, place), muscle)
+    if found is None:
+        want = f'a folder "{muscle}" in it, with the frames of this muscle'
+        raise InputError(place, f'"{entry.settings["folder"]}" without frames of the muscle', want)
+    return found[0]
+
+
 def _own(chosen: tuple[Candidate, str], name: str) -> tuple[Candidate, str] | None:
     """A candidate with its place; for recorded frames with the folder of the muscle ``name``, or None if it does not exist."""
     entry, place = chosen

@@ -82,6 +82,13 @@ def bars(bench: Bench[Case], reference: Run, name: str) -> ErrorBars | None:
     return (stored(bench, reference) or obtain(bench, reference)).get(name)
 
 
+def offered(bench: Bench[Case], reference: Run, name: str, *, asked: bool) -> ErrorBars | None:
+    """The error bars of the muscle ``name``, stored ones unless ``asked`` for; without a name, of the only muscle of a case."""
+    if not name:
+        return refinement.offered(bench, reference, asked=asked)
+    return (obtain if asked else stored)(bench, reference).get(name)
+
+
 def stored(bench: Bench[Case], reference: Run) -> dict[str, ErrorBars]:
     """The error bars of each muscle that are stored with a reference; empty if those of any muscle are missing."""
     found = {name: refinement.stored(reference, name) for name in bench.parts}

@@ -131,7 +131,7 @@ def test_a_solution_is_of_the_body_that_was_solved() -> None:
     assert not arguments.is_of_body(replace(run, body=None), body)
     with pytest.raises(fr.InputError, match="reference: got a solution of another body"):
         arguments.is_of_body(run, replace(body))
-    with pytest.raises(fr.InputError, match="muscle: got str 'x', want none"):
+    with pytest.raises(fr.InputError, match='muscle: got "x", want none'):
         fr.error_bars(body, run, muscle="x")
 
 
