@@ -89,7 +89,7 @@ class Grid:
         return of_spline(self.coefficients, np.asarray(self.origin), self.spacing, within)
 
     def sample(self, points: Floats) -> Sampled:
-        """Distance, gradient and curvature at ``points`` (n, 3) [mm]; outside the grid ``FAR`` and zeros, NaN for NaN."""
+        """Distance, gradient and curvature at ``points`` (n, 3) [mm]: ``FAR`` and 0 outside the grid, NaN where a coordinate is."""
         found = Sampled(np.full(len(points), FAR), np.zeros((len(points), 3)), np.zeros((len(points), 3, 3)))
         found.distance[~np.isfinite(points).all(axis=1)] = np.nan
         for chunk, at in self._inside(points):
