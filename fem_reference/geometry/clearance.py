@@ -24,7 +24,7 @@ class Clearance:
     spacing: float
 
     def __call__(self, points: Floats) -> Floats:
-        """A lower bound (n,) on the clearance [mm] of ``points`` (n, 3), at most 0 if none is certain, NaN where a point is."""
+        """A lower bound (n,) on the clearance [mm] of ``points`` (n, 3), at most 0 if none is certain; NaN if a coordinate is."""
         at = (points - self.origin) / self.spacing
         known = np.isfinite(at).all(axis=1)
         at = np.where(known[:, None], at, 0.0)

@@ -53,7 +53,7 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """An obstacle whose signed distance is a tricubic spline.
+    """The shape of a bone whose signed distance is a tricubic spline.
 
     ``coefficients`` (i, j, k) [mm] of the B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``. The distance
     is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and ``FAR`` outside the grid.
@@ -85,7 +85,7 @@ class Grid:
         return deepest if deepest > self.spacing else np.inf
 
     def clearance(self, within: float) -> Clearance:
-        """A lower bound on the length of paths from points to where the distance is at most ``within`` [mm]."""
+        """A lower bound on the length of paths from points to a place whose distance is at most ``within`` [mm]."""
         return of_spline(self.coefficients, np.asarray(self.origin), self.spacing, within)
 
     def sample(self, points: Floats) -> Sampled:

@@ -52,9 +52,9 @@ def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Mea
     """``deepest`` [mm], the greatest depth of the muscle below the surface of a bone, and ``volume`` [mm3] of the muscle inside
     bones, without the part nearest to the exempt surface; 0 if nothing is inside.
 
-    A triangle of the surface follows a bone if its corners are within the reach of ``Exemption`` of it, and its edges are at most
-    four times as long: greater depth between the corners is only the part of a round bone that a flat triangle cuts off. Depth
-    is measured at the vertices, and also between them in triangles that do not follow the bone. If the interior of the muscle
+    A triangle follows a bone if its corners are at most r from the bone, with r the reach of ``Exemption``, and its edges at most
+    4 r long: greater depth between the corners is then only the part of a round bone that a flat triangle cuts off. Depth is
+    measured at the vertices, and also between them in triangles that do not follow the bone. If the interior of the muscle
     reaches the middle of the bone, the depth of the interior counts. Near an attachment only depth added since rest counts. The
     same holds for an attachment inside another bone that moves differently; inside its own bone depth is not checked.
 
