@@ -1,4 +1,4 @@
-"""Measured muscles: facts of publications with their uncertainty and origin, and the record of each experiment."""
+"""Measured muscles: facts from publications with their uncertainty and origin, and the record of each experiment."""
 
 import csv
 import math
@@ -47,8 +47,8 @@ class Fact(Record):
 
 class Experiment(Record):
     """An experiment of a ``kind`` (measurement, model, or bands from several publications), with its ``specimen``, its ``boundary``
-    conditions, and the parts of it that a scene has ``repeated`` and ``not_repeated``. ``file``: a full curve, in the folder
-    ``FEM_REFERENCE_DATA``.
+    conditions, and the parts of it that a scene repeats (``repeated``) and does not repeat (``not_repeated``). ``file``: a full
+    curve, in the folder that the environment variable ``FEM_REFERENCE_DATA`` names.
     """
 
     title: _Text
@@ -70,7 +70,7 @@ def facts(folder: Path = FOLDER) -> Iterator[Fact]:
 
 def _fact(row: dict[str, str], place: str) -> Fact:
     if None in row or None in row.values():
-        raise InputError(place, "a row of another length", "one cell for each column")
+        raise InputError(place, "a row with too few or too many cells", "one cell for each column")
     read: dict[str, object] = dict(row)
     for key, kind in _NUMBERS.items():
         try:
@@ -92,12 +92,12 @@ def _own() -> tuple[Fact, ...]:
 
 
 def find(experiment: str, quantity: str, condition: str) -> Fact:
-    """The fact of an ``experiment`` whose condition has the words of ``condition``; LookupError unless there is exactly one."""
+    """The one fact of an ``experiment`` and ``quantity`` whose condition contains the text ``condition``; else LookupError."""
     found = [
         one for one in _own() if (one.experiment, one.quantity) == (experiment, quantity) and condition in one.condition
     ]
     if len(found) != 1:
-        raise LookupError(f"{len(found)} facts of {experiment}, {quantity} instead of one: {condition}")
+        raise LookupError(f"{len(found)} facts instead of one for {quantity} of {experiment}, condition {condition!r}")
     return found[0]
 
 
@@ -107,7 +107,7 @@ def model_band(quantity: str = "mean_surface_distance") -> tuple[Fact, ...]:
 
 
 def ratio(upper: Fact, lower: Fact) -> tuple[float, float]:
-    """The ratio of two facts, and its standard deviation as if they were independent; NaN if either has no deviation."""
+    """The ratio of two facts, and its standard deviation, assuming that they are independent; NaN if that of either is unknown."""
     value = upper.value / lower.value
     parts = [math.nan if one.sd is None else one.sd / one.value for one in (upper, lower)]
     return value, abs(value) * math.hypot(*parts)

@@ -78,8 +78,8 @@ class Judgement:
         if math.isnan(self.allowed):
             return "the baseline has no limit for the distance from the reference; --update adds it, now that there is an error bar"
         known = "the reference" if self.question == "within" else "the baseline"
-        text = f"{known} has an error bar of {self.known:.4g} {self.unit}"
-        return f"{text}; {self.away:.4g} {self.unit} differs from the allowed {self.allowed:.4g} {self.unit} by less"
+        text = f"the distance, {self.away:.4g} {self.unit}, differs from the allowed {self.allowed:.4g} {self.unit}"
+        return f"{text} by less than the error bar of {known}, {self.known:.4g} {self.unit}"
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def _of_statistic(name: str, stored: StoredStatistic, current: CurrentMeasures) 
 def _judged(
     question: Question, what: tuple[str, str], frames: _Frames, allowed: float, current: CurrentMeasures
 ) -> Judgement:
-    """The judgement by the decisive frame: with the decisive word, the farthest from its target or with the widest bar."""
+    """Judge by the frame with the combined verdict that is farthest from its target or, if inconclusive, has the widest bar."""
     words = [_word(*map(float, row), allowed=allowed) for row in zip(*frames, strict=True)]
     word = judge.overall(words)
     deciding = frames.bars if word == "inconclusive" else np.abs(frames.current - frames.truth)

@@ -27,7 +27,7 @@ from fem_reference.studies.execution import Bench
 def scene_of(options: argparse.Namespace) -> Case:
     """The case with the changes by ``--set``, the effects that it needs, and the expectations of all candidates by ``--limit``."""
     if options.negative_control and options.set:
-        raise InputError("--negative-control", "this option with --set", "one of the two")
+        raise InputError("--negative-control", "this option with --set", "only one of the two")
     changes = dict(map(casefile.setting, options.set))
     read = casefile.read(options.case, with_negative_control=options.negative_control, changes=changes)
     case = of_case.chosen(read)

@@ -31,7 +31,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     past = "write the page of changes since earlier results (a baseline of check, a stored run or a folder of frames)"
     parser.add_argument("--against", type=Path, metavar="BASELINE", help=past)
     share(parser, "--unit")
-    limit = "judge candidates: greatest deviation of a statistic, such as surface_deviation.max='5 mm'; may be repeated"
+    limit = "judge candidates: the greatest allowed deviation of a statistic, such as surface_deviation.max='5 mm'; may be repeated"
     parser.add_argument("--limit", action="append", default=[], metavar="METRIC.STATISTIC=VALUE", help=limit)
     share(parser, "--error-bar", "--negative-control", "--name", "--ranks")
 
@@ -55,9 +55,9 @@ def _against(case: Case, options: argparse.Namespace, chosen: list[tuple[Candida
     """Measure a candidate and its earlier version, and write the page of changes."""
     scene = casefile.muscle(case, "--against")
     if len(chosen) != 1:
-        raise InputError("--against", f"{len(chosen)} candidates", "one, by --candidate or --solver")
+        raise InputError("--against", f"{len(chosen)} candidates", "exactly one, given with --candidate or --solver")
     if options.limit:
-        raise InputError("--limit", "with --against", "one of the two: check compares with earlier results")
+        raise InputError("--limit", "this option with --against", "only one of the two: check judges changes")
     ((entry, place),) = chosen
     bench, path = checked_bench(scene, options, chosen), options.against
     if path.is_file() and path.suffix == ".json":

@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
     if options.muscle is None and options.unit is not None:
         raise InputError("--unit", f'"{options.unit}" without --muscle', "files with this unit")
     if options.muscle is not None and options.case is not None:
-        raise InputError("--from", f'"{options.case}" with --muscle', "one of the two")
+        raise InputError("--from", f'"{options.case}" with --muscle', "only one of the two")
     folder, unit, said = options.name, {}, ""
     if options.muscle is None:
         new_scene.copied(options.case or "hip_flexion", folder)

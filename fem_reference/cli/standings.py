@@ -23,7 +23,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "cases",
         metavar="CASE",
         nargs="*",
-        help=f"a case (default: {', '.join(standings.CASES)}; the last five need FEM_REFERENCE_DATA)",
+        help=f"a case (default: {', '.join(standings.CASES)}; the last five need the data below FEM_REFERENCE_DATA)",
     )
     program = (
         "a folder NAME with a program NAME.py and its candidate.toml, such as candidates/newton_vbd; may be repeated"

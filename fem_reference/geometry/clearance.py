@@ -24,7 +24,7 @@ class Clearance:
     spacing: float
 
     def __call__(self, points: Floats) -> Floats:
-        """A lower bound (n,) on the clearance [mm] of ``points`` (n, 3), 0 or below if no clearance is certain; NaN for NaN."""
+        """A lower bound (n,) on the clearance [mm] of ``points`` (n, 3), at most 0 if none is certain; NaN if a coordinate is."""
         at = (points - self.origin) / self.spacing
         known = np.isfinite(at).all(axis=1)
         at = np.where(known[:, None], at, 0.0)
@@ -32,7 +32,7 @@ class Clearance:
         nodes = np.rint(within).astype(np.int64)
         found = self.away[tuple(nodes.T)] - self.spacing * np.linalg.norm(within - nodes, axis=1)
         beyond = self.spacing * np.linalg.norm(at - within, axis=1)
-        # The grid is convex, so the path to the grid point nearest to an outside point makes no acute angle with the path beyond.
+        # As the grid is convex, the segment to its nearest point is at 90 degrees or more to any segment from there into the grid.
         found = np.where(beyond > 0, np.hypot(beyond, np.maximum(found, 0)), found)
         return np.where(known, found, np.nan)
 

@@ -49,8 +49,8 @@ class Exemption:
 
     @classmethod
     def of(cls, surface: Surface, attached: Iterable[tuple[str, Floats]] = ()) -> "Exemption":
-        """The exemption of a surface. ``attached``: for each attachment, the name of the bone and the shares (m, 3), 1 or 0, of the
-        corners of the triangles. The attached part is where these shares, linear in triangles, are at least 1/2.
+        """The exemption of a surface. ``attached``: for each attachment, the name of the bone and, for each corner of the triangles
+        (m, 3), 1 if attached and 0 if not. The attached part is where their linear interpolation is at least 1/2.
         """
         names, shares = zip(*attached, strict=True) if (attached := tuple(attached)) else ((), ())
         quarters = Pieces.whole(np.arange(len(surface.triangles))).quartered()

@@ -63,7 +63,7 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
 
     The depth in the bone is as accurate as its distance field; the depth in the body is exact.
     """
-    # In the frame of the bone its bounding boxes stay the same; if the bone is at rest, the boxes of the body do too.
+    # In the bone's coordinates its bounding boxes stay the same; if the bone is at rest, the boxes of the body do too.
     still = np.array_equal(pose, np.eye(4))
     local = body if still else body.moved_to(apply(np.linalg.inv(pose), body.points))
     pairs = crossings(local, bone)
@@ -72,7 +72,7 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
     def into_bone(points: Floats) -> Floats:
         return np.maximum(-shape.distances(points), 0.0) if len(points) else np.zeros(0)
 
-    def into_body(points: Floats) -> Floats:  # in the frame of the body, whose search tree serves all bones
+    def into_body(points: Floats) -> Floats:  # in the body's coordinates: its search tree serves all bones
         return depths_within(body, apply(pose, points), of_body)
 
     tips, bone_tips = (_tips(surface, crossing) for surface, crossing in ((body, of_body), (bone, of_bone)))

@@ -23,7 +23,7 @@ _SAMPLES = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Blended:
-    """The region of depth above 0: its share is ``(1000^t - 1) / 999``, where t grows from 0 at the border to 1 at a depth of
+    """The region where the depth is above 0: its share is ``(1000^t - 1) / 999``, where t grows from 0 at the border to 1 at depth
     ``width`` [mm].
 
     In a region a thousand times as stiff as the body, the stiffness grows by the same factor in equal parts of the width, so

@@ -1,8 +1,8 @@
-"""Signed distance to bones of simple shapes, in closed form, and the protocol of all obstacles.
+"""Signed distance to bones of simple shapes, in closed form, and the protocol of the shapes of all bones.
 
-Each body uses its own rest frame. Distances are negative inside; gradients are unit vectors out of the body, along the normal at
-the nearest part of the surface; curvatures are the second derivatives. On ridges, where two parts are equally near, one of the two
-is used; an infinite curvature (on a sharp edge, at a centre, on an axis) is replaced by zero.
+Coordinates are those of the body in its rest pose. Distances are negative inside; gradients are unit vectors out of the body, along
+the normal at the nearest part of the surface; curvatures are the second derivatives. On ridges, where two parts are equally near,
+one of the two is used; an infinite curvature (on a sharp edge, at a centre, on an axis) is replaced by zero.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ class Sampled(NamedTuple):
 
 
 class Obstacle(Protocol):
-    """A rigid body with a signed distance that changes along a path by at most ``steepest`` times the length of the path."""
+    """The shape of a bone: a signed distance that changes along a path by at most ``steepest`` times the path's length."""
 
     @property
     def steepest(self) -> float:
@@ -38,10 +38,10 @@ class Obstacle(Protocol):
         """The greatest depth [mm] inside the body."""
 
     def clearance(self, within: float) -> Callable[[Floats], Floats]:
-        """A lower bound (n,) [mm] on the length of paths from points (n, 3) to a distance of at most ``within`` [mm]."""
+        """A lower bound (n,) [mm], for points (n, 3), on the length of a path to a place at most ``within`` [mm] from the body."""
 
     def sample(self, points: Floats) -> Sampled:
-        """Distance and its two derivatives at ``points`` (n, 3) [mm] of the body's rest frame; NaN for NaN."""
+        """Distance and its two derivatives at ``points`` (n, 3) [mm], in the body's rest pose; NaN where a coordinate is NaN."""
 
     def distances(self, points: Floats) -> Floats:
         """The distance (n,) [mm] of :meth:`sample` alone."""
@@ -222,7 +222,7 @@ def _over(tensors: Floats, length: Floats) -> Floats:
 
 
 def _axis(start: Vector, end: Vector) -> tuple[NDArray[np.float64], float]:
-    """The unit vector from ``start`` to ``end`` and the length between them."""
+    """The unit vector from ``start`` to ``end`` and the distance between them."""
     direction = np.subtract(end, start, dtype=float)
     extent = float(np.linalg.norm(direction))
     return direction / extent, extent

@@ -53,7 +53,7 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """An obstacle whose signed distance is a tricubic spline.
+    """The shape of a bone whose signed distance is a tricubic spline.
 
     ``coefficients`` (i, j, k) [mm] of the B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``. The distance
     is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and ``FAR`` outside the grid.
@@ -85,11 +85,11 @@ class Grid:
         return deepest if deepest > self.spacing else np.inf
 
     def clearance(self, within: float) -> Clearance:
-        """A lower bound on the length of paths from points to where the distance is at most ``within`` [mm]."""
+        """A lower bound on the length of paths from points to a place whose distance is at most ``within`` [mm]."""
         return of_spline(self.coefficients, np.asarray(self.origin), self.spacing, within)
 
     def sample(self, points: Floats) -> Sampled:
-        """Distance, gradient and curvature at ``points`` (n, 3) [mm]; outside the grid ``FAR`` and zeros, NaN for NaN."""
+        """Distance, gradient and curvature at ``points`` (n, 3) [mm]: ``FAR`` and 0 outside the grid, NaN where a coordinate is."""
         found = Sampled(np.full(len(points), FAR), np.zeros((len(points), 3)), np.zeros((len(points), 3, 3)))
         found.distance[~np.isfinite(points).all(axis=1)] = np.nan
         for chunk, at in self._inside(points):

@@ -12,7 +12,7 @@ from fem_reference.runs.store import Run
 STATISTICS = {
     "deepest": Statistic(
         "mm",
-        "In muscles",
+        "Penetration of muscles",
         "deepest",
         headline="{} deep in another muscle",
         curve="Depth to which the muscle and another muscle penetrate each other",

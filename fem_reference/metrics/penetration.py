@@ -1,6 +1,6 @@
 """Depth and volume of a run's muscle inside the bones, independent of the reference.
 
-The distance field is the field used for contact. Where contact is exempt, only the depth added since rest counts.
+The distance field is the field used for contact. Where the surface is exempt from contact, only the depth added since rest counts.
 """
 
 import logging
@@ -23,7 +23,7 @@ from fem_reference.runs.store import Run
 STATISTICS = {
     "deepest": Statistic(
         "mm",
-        "In bones",
+        "Penetration",
         "deepest",
         curve="Depth of the muscle inside a bone (near attachments, the depth added since rest)",
         shown={"table": 80, "curve": 50, "solvers": 70, "scenes": 40},
@@ -52,11 +52,11 @@ def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Mea
     """``deepest`` [mm], the greatest depth of the muscle below the surface of a bone, and ``volume`` [mm3] of the muscle inside
     bones, without the part nearest to the exempt surface; 0 if nothing is inside.
 
-    Depth is measured at the vertices of the surface, and between vertices in triangles that do not follow the bone. If the interior
-    of the muscle reaches the middle of the bone, the depth of the interior counts. Near an attachment only depth added since rest
-    counts. The same holds for an attachment inside another bone that moves differently; inside its own bone depth is not checked.
-    A triangle follows a bone if all its corners are within the reach of ``Exemption`` and its edges are shorter than four times
-    that reach. Any greater depth between the corners is the part of a round bone that a flat triangle cuts off.
+    A triangle follows a bone if its corners are at most r from the bone, with r the reach of ``Exemption``, and its edges at most
+    4 r long: greater depth between the corners is then only the part of a round bone that a flat triangle cuts off. Depth is
+    measured at the vertices, and also between them in triangles that do not follow the bone. If the interior of the muscle
+    reaches the middle of the bone, the depth of the interior counts. Near an attachment only depth added since rest counts. The
+    same holds for an attachment inside another bone that moves differently; inside its own bone depth is not checked.
 
     The depth is as accurate as the field of the bone (``Grid.mean_error``, with rounding). The volume is estimated from random
     points (``shared``). On the muscles of a hip, 12 volumes from 5 to 24 000 mm3 differed by less than 1 % from an estimate with

@@ -90,7 +90,7 @@ def penalty(gap: Floats, k: float, d: float) -> tuple[Floats, Floats]:
 
 
 def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: float) -> Floats:
-    """The smallest gap (n,) [mm], negative inside, to a ``bone`` in its rest frame on straight ``paths`` (n, 3) [mm] from their
+    """The smallest gap (n,) [mm], negative inside, to a ``bone`` in its rest pose on straight ``paths`` (n, 3) [mm] from their
     ``starts`` (n, 3) [mm], sampled at strides as long as the gap allows, at least ``least`` [mm].
     """
     smallest = np.full(len(starts), np.inf)

@@ -49,7 +49,7 @@ class Bone:
 
     @cached_property
     def shape(self) -> Obstacle:
-        """The signed distance to the surface, in the bone's rest frame; InputError if the surface of a file is not closed."""
+        """The signed distance to the surface, in the bone's rest pose; InputError if the surface of a file is not closed."""
         named = replace(self.surface, place=f'bone "{self.name}": {self.surface.place}')
         error, rounding = self.distance_error, self.distance_rounding
         return self.solid or cached(named, error, DISTANCE_MARGIN, rounding, kept_distances())

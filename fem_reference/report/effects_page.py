@@ -16,7 +16,9 @@ from fem_reference.report.words import duration, listed, number, words
 
 MAIN = "surface_deviation.rms"
 # The heading of each column of the table, by name.
-HEADS = {".".join(key): one.label.lower() for key, one in described("main").items()}
+HEADS = {
+    ".".join(key): f"{one.title} ({one.part})".removesuffix(" ()").lower() for key, one in described("main").items()
+}
 # The axis ends at this factor below the least change that counts; smaller changes are drawn at its end, with their value.
 _DEPTH = 10.0
 
@@ -41,7 +43,7 @@ def page(found: CaseOmissions) -> Page:
 
 
 def label(ablation: Ablation, omission: Omission) -> str:
-    """The effects or features left out, in words: "all of them" if no other could be left out."""
+    """The effects or features left out, in words: "all of them" if nothing else could be left out."""
     if not omission.left_out:
         return "nothing"
     every = {name for one in ablation.omissions for name in one.left_out}
@@ -67,8 +69,9 @@ def phases(found: CaseOmissions) -> list[str]:
 
 def sentences(found: CaseOmissions, ablation: Ablation) -> list[str]:
     """The changes due to leaving out effects or features of a run, in sentences."""
-    if ablation.whole.status != "converged":
-        return [f"Nothing was left out, as the whole run {ablation.whole.status}: {ablation.whole.message}"]
+    whole = ablation.whole
+    if whole.status != "converged":
+        return [f"Nothing was left out, because the complete run did not converge ({whole.status}): {whole.message}"]
     if not ablation.omissions:
         return ["There is nothing that could be left out."]
     said = [_sentence(found, ablation, one) for one in ablation.omissions]
@@ -82,19 +85,15 @@ def _sentence(found: CaseOmissions, ablation: Ablation, one: Omission) -> str:
     name = label(ablation, one)
     if not one.changes:
         return f"Without {name}: {one.status}. {one.message}"
-    said = {
-        "matters": "It matters",
-        "hardly": "It hardly matters",
-        "does not matter": "It does not matter",
-        "not known": "Whether it matters is unknown",
-    }[omissions.verdict(one.changes, found.bars)]
+    word = omissions.verdict(one.changes, found.bars)
+    said = {"hardly": "It hardly matters", "not known": "Whether it matters is unknown"}.get(word, f"It {word}")
     saved = 1 - ablation.relative(one.seconds)
     time = "" if math.isnan(saved) else f" and {'saves' if saved >= 0 else 'costs'} {percent(abs(saved))} of the time"
     return f"Leaving out {name} changes {_most(found, one)}{time}. {said}."
 
 
 def _most(found: CaseOmissions, one: Omission) -> str:
-    """The greatest change, in error bars, in words."""
+    """The change that is largest relative to its error bar, in words."""
     in_bars = omissions.in_bars(one.changes, found.bars).items()
     ratios = {name: ratio for name, ratio in in_bars if not math.isnan(ratio)}
     name = max(ratios, key=lambda name: ratios[name]) if ratios else next(iter(one.changes))
@@ -129,10 +128,10 @@ def drawing(found: CaseOmissions) -> Drawing | None:
         axes.axvline(0, color="#888888", linewidth=0.8)
         if bar > 0:
             axes.axhspan(floor / 2, bar, color=BAND, linewidth=0, label="error bar of the reference")
-        axes.set(xlabel="time saved, % of the whole run", ylabel="change of the surface, rms, mm")
+        axes.set(xlabel="time saved, % of the complete run", ylabel="change of the surface (rms), mm")
         figure.legend(loc="outside lower center", ncols=4, fontsize="small")
 
-    return drawn(f"omissions-{found.case}", "Error of omission against time saved", (7.2, 4.2), draw)
+    return drawn(f"omissions-{found.case}", "Change due to each omission against time saved", (7.2, 4.2), draw)
 
 
 def _draw(axes: Axes, rows: list[tuple[str, float, float]], floor: float, colour: str, name: str) -> None:

@@ -24,8 +24,8 @@ DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in describ
 
 # The same springs at points of the surface and over facets of the tetrahedra, on gluteus_medius and gluteus_maximus at 1 rad.
 SPREAD = (
-    "Attachments are springs, and 5 to 9 % of a force or moment depend on how the same springs are spread over them (5.3 "
-    "and 8.8 % on two muscles of the hip): error bars of forces and moments exclude it and report it as the effect of another model"
+    "Attachments are springs, and 5 to 9 % of a force or moment depend on how the same springs are spread over them (5.3 and "
+    "8.8 % on two muscles of the hip): error bars of forces and moments exclude this effect and report it as that of another model"
 )
 
 

@@ -95,7 +95,7 @@ def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats)
 @compiled
 def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) -> tuple[Ints, Floats]:
     """Indices (k,) and positions (k, 3) of the ``points`` (n, 3) at a distance of ``clear`` (n,) [mm] or more from their places at
-    the last check, ``asked_at`` (n, 3), all in the rest frame of a bone at ``pose``.
+    the last check, ``asked_at`` (n, 3), all in the coordinates of the rest pose of a bone at ``pose``.
     """
     found, places = np.empty(len(points), np.int64), np.empty_like(points)
     count = 0

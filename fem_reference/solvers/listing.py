@@ -1,8 +1,8 @@
-"""The report's Octave listings (4.1 on an interval, 4.5 on triangles): their results, even if the report's text differs.
+"""The report's Octave listings (4.1 on an interval, 4.5 on triangles): their results, even where they contradict the report's text.
 
 Listings 4.1, 4.2, 4.4 and 4.5 are transcribed. Vertices are numbered from 0 here and from 1 in the listings. ``bounds`` (2, m) is
-the listings' list of Dirichlet conditions: a row of vertices and a row of values. Lengths have any unit, or none: only the
-directions of the edges of a mesh count. validation/octave has the listings as run, their results, and the reading of each misprint.
+the listings' list of Dirichlet conditions: a row of vertices and a row of values. Lengths may have any unit: only the directions
+of the edges of a mesh count. validation/octave has the listings as run, their results, and how each misprint was read.
 """
 
 import time
@@ -33,7 +33,7 @@ class ListingSettings(Record):
 def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outcome:
     """The result of the listing for the problem's domain, with its mesh and fixed values, and the listing's own effects and slopes.
 
-    Listing 4.5 draws minus the norm of its vector unknown: that is the field here, and the vector is its ``components``.
+    Listing 4.5 plots the negative norm of its vector unknown. This is the field here, and the vector is its ``components``.
     """
     begin = time.perf_counter()
     mesh = problem.mesh
@@ -49,13 +49,13 @@ def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outco
         values = np.concatenate([values, values[mesh.edges].mean(axis=1)])
     unknowns = len(mesh.points) if components is None else components.size
     cost = {"seconds_solve": time.perf_counter() - begin, "unknowns": float(unknowns)}
-    sink(Frame.of_field(problem, values, "as listed", components))
-    return Outcome("converged", "as listed", cost)
+    sink(Frame.of_field(problem, values, "as in the report's listing", components))
+    return Outcome("converged", "computed as in the report's listing", cost)
 
 
 def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
-    """Raise InputError at ``place`` if the listing for the problem's domain lacks something that case or settings request. Listing
-    4.1 has the conditions 0 at the first node and slope -1 at the last; listing 4.5 has values only.
+    """Raise InputError at ``place`` if the listing for the problem's domain lacks something that the case or the settings request.
+    Listing 4.1 has the conditions 0 at the first node and slope -1 at the last; listing 4.5 has values only.
     """
     points, fixed = problem.mesh.points, problem.fixed[: len(problem.mesh.points)]
     if problem.mesh.cells.shape[1] == 2:
@@ -72,8 +72,8 @@ def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
 def fem1d(nodes: Floats, peclet: float) -> Floats:
     """Listing 4.1 at given increasing ``nodes`` (n,): the solution (n,), 0 at the first node and of slope -1 / peclet at the last.
 
-    ``diff_op = -peclet K`` with K the stiffness matrix of linear elements, and the source 1 is divided by ``peclet``: it
-    solves ``peclet psi'' = 1 / peclet``, ``peclet psi'(1) = -1``. On (0, 1) the values at the nodes are exact for any nodes:
+    ``diff_op = -peclet K`` with K the stiffness matrix of linear elements, and the source 1 is divided by ``peclet``, so the
+    listing solves ``peclet psi'' = 1 / peclet``, ``peclet psi'(1) = -1``. On (0, 1) the values are exact at any nodes:
     ``psi = x^2 / (2 peclet^2) - x (1 / peclet + 1 / peclet^2)``, which is eq. 4.10 for a ``peclet`` of 1. There is no advection.
     """
     steps = np.diff(nodes)
@@ -91,11 +91,11 @@ def fem1d(nodes: Floats, peclet: float) -> Floats:
 
 
 def first_derivative(triangles: Ints, points: Floats) -> Any:
-    """Listing 4.2: the sparse matrix A (n dim, n dim) over ``triangles`` (m, 3) of ``points`` (n, dim), dim by dim for each vertex.
+    """Listing 4.2: sparse A (n dim, n dim) over ``triangles`` (m, 3) of ``points`` (n, dim): one block for each pair of points.
 
     For every edge of every triangle, with d its direction: ``d d^T`` is added to the blocks of both its ends and subtracted from
     the two blocks between them. A is not a differential operator: ``u^T A u = sum over edges of w (d . (u_s - u_t))^2`` is twice
-    the energy of springs along the edges, all of one stiffness for any length, w = 2 inside and 1 at the rim.
+    the energy of springs along the edges, all of the same stiffness, whatever their length; w = 2 inside and 1 at the rim.
     """
     dim = points.shape[1]
     s, t = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
@@ -144,10 +144,10 @@ def right_side(points: Floats) -> Floats:
 
 def fem2d(triangles: Ints, points: Floats, bounds: Floats) -> tuple[Floats, Floats]:
     """Listing 4.5 over ``triangles`` (m, 3) of ``points`` (n, 2 or 3): its x (n,), and the vector unknown (n, dim) whose norm
-    is x. The listing draws -x.
+    is x (the listing draws -x): ``(26 A A + 2 A + 0.05) u = b``.
 
-    ``(26 A A + 2 A + 0.05) u = b`` with A of listing 4.2, positive semidefinite, on the side of minus a second derivative: of order
-    4, 2 and 0, while the text's ``26 psi'' + 2 psi' + 0.05 psi = f`` is of order 2, 1 and 0.
+    A, from listing 4.2, is positive semidefinite and so has the sign of minus a second derivative. The three terms therefore
+    correspond to derivatives of order 4, 2 and 0, those of the text's ``26 psi'' + 2 psi' + 0.05 psi = f`` to order 2, 1 and 0.
     """
     dim = points.shape[1]
     A = first_derivative(triangles, points)

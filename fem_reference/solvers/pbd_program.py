@@ -100,7 +100,7 @@ class Voxels:
 
 
 class VoxelBone:
-    """The ``voxels`` of a bone in its rest frame, its ``pose``, and its ``last`` motion that was not zero; both 4 x 4.
+    """The ``voxels`` of a bone in its rest pose, its present ``pose``, and its ``last`` motion that was not zero; both 4 x 4.
 
     The pose is the product of all motions, as in the program; it differs from the ``given`` pose by rounding.
     """

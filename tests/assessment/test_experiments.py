@@ -85,5 +85,5 @@ def test_the_least_number_of_specimens_is_unknown_where_one_is() -> None:
 
 def test_a_fact_that_is_not_there_alone_is_an_error() -> None:
     for condition in ("", "nowhere"):
-        with pytest.raises(LookupError, match="facts of walter_2022, axial_stress instead of one"):
+        with pytest.raises(LookupError, match="facts instead of one for axial_stress of walter_2022"):
             find("walter_2022", "axial_stress", condition)

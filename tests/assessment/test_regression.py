@@ -118,14 +118,17 @@ def test_nothing_is_said_where_the_bar_reaches_both_sides_of_what_is_allowed(pat
     assert (judged.frame, judged.known) == (20, BAR)
     edited(path, lambda table: table["measures"][name].update(within=12.1))
     why = asked(checked(path, current(known=bars())), "within", name).why
-    assert why == "the reference has an error bar of 0.5 mm; 12 mm differs from the allowed 12.1 mm by less"
+    assert (
+        why
+        == "the distance, 12 mm, differs from the allowed 12.1 mm by less than the error bar of the reference, 0.5 mm"
+    )
 
 
 def test_an_edited_tolerance_below_rounding_says_nothing(path) -> None:
     edited(path, lambda table: table["positions"].update(tolerance=0.001))
     moved = asked(checked(path, current(known=bars())), "unchanged", "positions.moved")
     assert moved.word == "inconclusive"
-    assert "the baseline has an error bar of 0.00866 mm" in moved.why
+    assert "the error bar of the baseline, 0.00866 mm" in moved.why
 
 
 def test_without_error_bars_the_past_is_judged_and_the_truth_is_not(tmp_path) -> None:

@@ -117,7 +117,7 @@ def test_where_nothing_can_be_said_it_is_reported_and_fails_nothing(work, capsys
     work.baseline.write_text(json.dumps(table))
     assert work.check() == cli.DONE
     printed = capsys.readouterr().out
-    assert "inconclusive: the reference has an error bar of" in printed
+    assert "by less than the error bar of the reference, " in printed
     assert "verdict: inconclusive" in printed
 
 

@@ -15,7 +15,7 @@ from tests.studies.test_omissions import found, omission
 def test_the_page_says_what_each_changes_and_what_it_saves() -> None:
     contact, gravity, kept = effects_page.sentences(found(), found().ablations[0])
     assert contact == (
-        "Leaving out contact changes the surface, rms by 3 mm (error bar ± 0.300 mm) and saves 60 % of the time. It matters."
+        "Leaving out contact changes the surface (rms) by 3 mm (error bar ± 0.300 mm) and saves 60 % of the time. It matters."
     )
     assert gravity.endswith("by 0.0100 mm (error bar ± 0.300 mm) and saves 10 % of the time. It does not matter.")
     assert kept == "The material itself is never left out: neo hooke."

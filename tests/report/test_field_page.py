@@ -115,7 +115,7 @@ def test_the_form_is_reported_with_its_reason(tmp_path, form, speed, printed):
     assert printed in text
     assert ("coth Pe" in text) == ("SUPG" in printed)
     assert ">supg</td>" in text if "SUPG" in printed else ">galerkin</td>" in text
-    assert ">as listed</td>" in text
+    assert ">as in the report&#39;s listing</td>" in text
 
 
 def test_every_row_of_the_differences_is_complete_and_on_the_page(tmp_path):

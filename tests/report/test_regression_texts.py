@@ -101,8 +101,10 @@ def test_text_names_failures_and_why_nothing_can_be_said(mixed) -> None:
     assert any(
         "or further from it, run: ./fem compare ball --candidate ... --against BASELINE" in line for line in lines
     )
-    unknown = "inconclusive: the reference has an error bar of 0.5 mm; 0 mm differs from the allowed 0.1 mm by less"
-    assert f"{unknown} (fibre_length.rms within)" in lines
+    unknown = (
+        "inconclusive: the distance, 0 mm, differs from the allowed 0.1 mm by less than the error bar of the reference"
+    )
+    assert f"{unknown}, 0.5 mm (fibre_length.rms within)" in lines
     assert lines[-1] == "verdict: fail"
     many = replace(mixed, judgements=mixed.judgements[:1] * 20)
     assert regression_texts.text(many).count("fail: ") == regression_texts.MOST_ROWS

@@ -1,9 +1,9 @@
 """A Hill-type muscle: a contractile and a parallel element at a pennation angle, in series with a tendon (report 5.1, Figure 5.1).
 
-Forces are shares of the greatest isometric force F0, fibre lengths of the optimal length l0; velocities of shortening are positive,
-as in (5.1). The curves are those of Thelen (2003, doi 10.1115/1.1531112), with constants as in OpenSim's ``Thelen2003Muscle``;
-the structure is Zajac's (1989), and the hyperbola (5.1) is Hill's. Its constants follow from a / F0 and the greatest velocity, ``b
-= a / F0 vmax``. Unlike in Thelen's model, activation does not change the greatest velocity.
+Forces are relative to the maximum isometric force F0, fibre lengths to the optimal length l0; velocities of shortening are positive
+(5.1). The curves are those of Thelen (2003, doi 10.1115/1.1531112), with constants as in OpenSim's ``Thelen2003Muscle``;
+the structure is Zajac's (1989), and the hyperbola (5.1) is Hill's. Its constants follow from a / F0 and the maximum shortening
+velocity, ``b = a / F0 vmax``. Unlike in Thelen's model, this velocity does not depend on the activation.
 """
 
 import math
@@ -22,14 +22,14 @@ from fem_reference.foundations.units import Angle, Force, PositiveLength
 # Thelen 2003, young adults: width of the active curve; shape of the passive curve and its strain at F0; the strain of the tendon at
 # F0; the greatest force in lengthening.
 _WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN, _LENGTHENING = 0.45, 5.0, 0.6, 0.04, 1.4
-# The tendon's toe ends at this share of F0, with this shape; beyond its end strain the curve is a line of the same slope (Thelen).
+# The tendon's toe ends at this share of F0, with this shape; beyond it the curve is a straight line with the slope at its end.
 _TOE, _TOE_SHAPE = 0.33, 3.0
 _TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # times the strain
 _TOE_STRAIN = _TENDON_STRAIN * _TOE_SLOPE / (_TOE_SLOPE + 1 - _TOE)
-# Fibres are sought between these lengths in steps of at most this; velocities are found to this share of F0.
+# Equilibrium fibre lengths [l0] are sought between the first two, in steps of at most the third.
 _SHORTEST, _LONGEST, _STEP = 0.1, 3.0, 0.0075
 _SLACK = 1e-9  # a tendon with less strain than this, which may be rounding, is slack
-_LEAST = 1e-3  # the least activation for which a velocity follows from a force
+_LEAST = 1e-3  # a lower activation counts as this one where a velocity is computed from a force
 
 
 class Hill(Record):
@@ -57,17 +57,17 @@ class Hill(Record):
         return math.sqrt(max(1 - (self.thickness / fibre) ** 2, 0.0))
 
     def tendon_force(self, path: float, fibre: float) -> float:
-        """The force [F0] of the tendon of a ``path`` [mm] from origin to insertion with a ``fibre`` length [l0]."""
+        """The tendon force [F0], given the length of the ``path`` [mm] from origin to insertion and the ``fibre`` length [l0]."""
         along = self.optimal_length * fibre * self.cosine(fibre)
         return tendon((path - along) / self.slack_length - 1)
 
     def imbalance(self, path: float, fibre: float, activation: float) -> float:
-        """The force [F0] of resting fibres along the tendon minus the force of the tendon."""
+        """The force [F0] of fibres at zero velocity along the tendon, minus the force of the tendon."""
         return (activation * active(fibre) + passive(fibre)) * self.cosine(fibre) - self.tendon_force(path, fibre)
 
     def static(self, path: float, activation: float) -> tuple[float, float]:
-        """The force [N] and the fibre length [l0] in equilibrium at rest, the equilibrium with the shortest fibre if there are
-        several. A slack tendon has no force. InputError if fibres would be shorter than a tenth of their optimal length.
+        """The force [N] and the fibre length [l0] in static equilibrium (zero velocity); of several equilibria, the one with the
+        shortest fibre. A slack tendon has no force. InputError if fibres would be shorter than a tenth of their optimal length.
         """
         low = max(_SHORTEST, 1.0001 * self.thickness)
         if self.tendon_force(path, low) == 0:
@@ -78,7 +78,7 @@ class Hill(Record):
         pulls = np.array([self.imbalance(path, one, activation) for one in lengths.tolist()]) >= 0
         found = int(np.argmax(pulls))
         if found == 0:
-            want = "a path on which fibres keep a tenth of their optimal length"
+            want = "a path on which fibres keep at least a tenth of their optimal length"
             raise InputError("hill", f"a path of {path:.4g} mm", want)
         bracket = lengths[found - 1], lengths[found]
         fibre = float(scipy.optimize.brentq(lambda one: self.imbalance(path, one, activation), *bracket, xtol=1e-13))
@@ -118,9 +118,9 @@ class Hill(Record):
 
 
 class HillSettings(Record):
-    """Settings of lines as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1). ``max_force`` of all lines
-    together. ``fibre_share``: the optimal fibre length of a line divided by its length at the first frame, at which its tendon is
-    just slack. ``pennation``: the angle between fibres and tendon. ``activation``: from 0 to 1.
+    """Settings for lines that are modelled as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1).
+    ``max_force``: the total of all lines. ``fibre_share``: the optimal fibre length of a line divided by its length at the first
+    frame, at which its tendon is just slack. ``pennation``: the angle between fibres and tendon. ``activation``: from 0 to 1.
     """
 
     max_force: Force
@@ -129,7 +129,7 @@ class HillSettings(Record):
     activation: Annotated[float, Field(ge=0, le=1)] = 1.0
 
     def muscles(self, lengths: Floats) -> tuple[Hill, ...]:
-        """The muscle of each line (k,) of these ``lengths`` [mm] at the first frame."""
+        """One muscle per line, given the ``lengths`` (k,) [mm] of the lines at the first frame."""
         share, angle = self.fibre_share, self.pennation
         return tuple(
             Hill.model_construct(
@@ -153,7 +153,7 @@ def passive(fibre: float) -> float:
 
 
 def tendon(strain: float) -> float:
-    """The force [F0] of the tendon: 0 if it is slack, then an exponential toe, then linear with the same slope."""
+    """The force [F0] of the tendon: 0 if it is slack, then an exponential toe, then a straight line with the slope at its end."""
     if strain <= 0:
         return 0.0
     if strain <= _TOE_STRAIN:
@@ -167,7 +167,7 @@ def _strain(force: float) -> float:
 
 
 def inverse_hyperbola(force: float, curvature: float) -> float:
-    """The velocity of shortening, as a share of the greatest, at a ``force``, a share of the isometric force: (5.1) solved for v.
+    """The shortening velocity, relative to its maximum, at a ``force`` relative to the maximum isometric force: (5.1) solved for v.
 
     In lengthening the force rises to 1.4 along a hyperbola that is twice as steep at 0 (Thelen 2003). Tangents continue both curves
     beyond their ends.
