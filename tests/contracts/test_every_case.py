@@ -292,9 +292,12 @@ def test_an_unsolved_case_says_where_and_why_and_keeps_what_it_reached(name, tmp
     status, facts = run(scene, tmp_path, monkeypatch)
     assert status == cli.SOLVER_FAILED
     facts = next(iter(facts["muscles"].values())) if scene.parts else facts
-    assert facts["status"] in ("diverged", "inverted")
-    assert "the smallest det F is" in facts["message"]
-    assert "the deepest contact is" in facts["message"]
+    if facts["status"] == "denied":
+        assert "in each other" in facts["message"]
+    else:
+        assert facts["status"] in ("diverged", "inverted")
+        assert "the smallest det F is" in facts["message"]
+        assert "the deepest contact is" in facts["message"]
     reached = [frame for frame, value in rows(facts, "volume", "deviation").items() if value is not None]
     assert reached[:2] == list(scene.frames.numbers[:2])
 

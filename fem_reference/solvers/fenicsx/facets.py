@@ -1,6 +1,7 @@
 """Facets of a body's surface as it deforms: polynomials between their nodes, points on facets, and nearest places on these."""
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 import basix
@@ -10,6 +11,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Cells
 from fem_reference.solvers.fenicsx.meshes import Displacement, lagrange
 
+_NINE = np.asarray(lagrange("quadrilateral", 2).points)  # these places determine a function of every element
 _ITERATIONS, _ROUGH = 12, 2  # of Newton's method for the nearest place, and for places far beyond the edges
 _LONGEST, _SMALL = 0.5, 1e-14  # the longest step, and one small enough to stop, in reference coordinates
 # The least sine of a line on a facet in a step, and the distance [mm] up to which it meets a place.
@@ -66,26 +68,27 @@ class Facets:
         points, weights = basix.make_quadrature(self.element.cell_type, degree)
         return np.asarray(points), np.asarray(weights)
 
+    @cached_property
+    def coefficients(self) -> Floats:
+        """The coefficients (9, 6, k) of the ``_powers`` in the k functions and their derivatives: whole numbers."""
+        return np.rint(np.tensordot(np.linalg.inv(_powers(_NINE)), self.element.tabulate(2, _NINE)[..., 0], (1, 1)))
+
     def places(self, nodes: Floats, which: Ints, at: Floats) -> FacetPlaces:
         """The places ``at`` (n, 2) on the facets ``which`` (n,), whose ``nodes`` (m, k, 3) [mm] are given."""
-        tables, nodes = self.element.tabulate(2, at)[..., 0], nodes[which]
-        point, u, v, uu, uv, vv = np.einsum("dnk,nki->dni", tables, nodes)
+        tables = np.tensordot(_powers(at), self.coefficients, 1)
+        point, u, v, uu, uv, vv = np.moveaxis(tables @ nodes[which], 1, 0)
         across = np.cross(u, v) * self.outward[which, None]
         normal = across / np.linalg.norm(across, axis=1)[:, None]
-        bends = [np.einsum("ni,ni->n", second, normal) for second in (uu, uv, uv, vv)]
-        bend = np.stack(bends, axis=1).reshape(-1, 2, 2)
-        slopes = np.swapaxes(tables[1:3], 0, 1)
-        return FacetPlaces(at, tables[0], slopes, point, np.stack([u, v], axis=1), normal, bend)
+        bend = np.stack([np.vecdot(second, normal) for second in (uu, uv, uv, vv)], axis=1).reshape(-1, 2, 2)
+        return FacetPlaces(at, tables[:, 0], tables[:, 1:3], point, np.stack([u, v], axis=1), normal, bend)
 
     def nearest(self, nodes: Floats, which: Ints, points: Floats) -> FacetPlaces:
         """The places on the facets ``which`` (n,), continued beyond their edges, that are nearest to ``points`` (n, 3) [mm], by
         Newton's method from the middles of the facets; only rough where they are far beyond the edges. Where the method does not
         converge, ``at`` is far beyond the edges: the point would seem near to a facet from which it is far.
         """
-        at, going = self._middles(which)
+        at, going = np.tile(self.element.points.mean(axis=0), (len(which), 1)), np.arange(len(which))
         for i in range(_ITERATIONS):
-            if not len(going):
-                break
             place = self.places(nodes, which[going], at[going])
             away = points[going] - place.point
             gap = np.einsum("ni,ni->n", away, place.normal)
@@ -104,10 +107,8 @@ class Facets:
         """The places where lines through ``points`` (n, 3) [mm] along ``normals`` (n, 3) meet the facets ``which`` (n,), continued
         beyond their edges, by Newton's method as in ``nearest``; and the distances (n,) [mm] along the lines, NaN where they miss.
         """
-        at, going = self._middles(which)
+        at, going = np.tile(self.element.points.mean(axis=0), (len(which), 1)), np.arange(len(which))
         for i in range(_ITERATIONS):
-            if not len(going):
-                break
             place, normal = self.places(nodes, which[going], at[going]), normals[going]
             (u, v), away = np.moveaxis(place.tangents, 1, 0), points[going] - place.point
             size, across = np.linalg.norm(np.cross(u, v), axis=1), np.vecdot(np.cross(u, v), normal)
@@ -118,11 +119,6 @@ class Facets:
         gap = np.vecdot(found.point - points, normals)
         off = np.linalg.norm(found.point - points - gap[:, None] * normals, axis=1)
         return found, np.where(off < _OFF, gap, np.nan)
-
-    def _middles(self, which: Ints) -> tuple[Floats, Ints]:
-        """The coordinates (n, 2) of the middles of facets ``which`` (n,), and the numbers (n,) of these."""
-        middle = np.asarray(basix.geometry(self.element.cell_type)).mean(axis=0)
-        return np.tile(middle, (len(which), 1)), np.arange(len(which))
 
     def _moved(self, at: Floats, going: Ints, step: Floats, iteration: int) -> Ints:
         """Move the places ``going`` (k,) of ``at`` (n, 2) by a ``step`` (k, 2), shortened if long; return those that go on."""
@@ -138,9 +134,7 @@ class Facets:
         """The distance (n,) as in ``beyond``, and its derivative (n, 2)."""
         (u, v), triangle = at.T, self.element.cell_type == basix.CellType.triangle
         far = [0 * u, -u, -v, *([u + v - 1] if triangle else [u - 1, v - 1])]
-        slopes = np.array(
-            [(0.0, 0.0), (-1.0, 0.0), (0.0, -1.0), *([(1.0, 1.0)] if triangle else [(1.0, 0.0), (0.0, 1.0)])]
-        )
+        slopes = np.array([(0, 0), (-1, 0), (0, -1), *([(1, 1)] if triangle else [(1, 0), (0, 1)])], float)
         return np.max(far, axis=0), slopes[np.argmax(far, axis=0)]
 
     @staticmethod
@@ -150,6 +144,12 @@ class Facets:
         return middles, _BALL * np.linalg.norm(nodes - middles[:, None], axis=2).max(axis=1)
 
 
+def _powers(at: Floats) -> Floats:
+    """The products (n, 9) of powers up to the second of reference coordinates ``at`` (n, 2); every element's functions are sums."""
+    powers = np.stack([1 + 0 * at, at, at * at], axis=2)
+    return np.asarray((powers[:, 0, :, None] * powers[:, 1, None]).reshape(len(at), 9))
+
+
 def facets_of(displacement: Displacement, mesh: Cells, facets: Ints) -> Facets:
     """The ``facets`` of a ``mesh`` on one rank, in the order of their numbers there."""
     space, msh = displacement.space, displacement.space.mesh
@@ -157,17 +157,15 @@ def facets_of(displacement: Displacement, mesh: Cells, facets: Ints) -> Facets:
     beside = np.array([cells.links(facet)[0] for facet in facets], np.int64)
     numbers = [int(np.flatnonzero(back.links(cell) == facet)[0]) for cell, facet in zip(beside, facets, strict=True)]
     whole: Any = space.element.basix_element
-    side = "triangle" if mesh.kind == "tetrahedron" else "quadrilateral"
-    element = lagrange(side, whole.degree)
+    element = lagrange("triangle" if mesh.kind == "tetrahedron" else "quadrilateral", whole.degree)
     corners, topology = basix.geometry(basix.CellType[mesh.kind]), basix.topology(basix.CellType[mesh.kind])[2]
     local = np.empty((len(topology), element.dim), np.int64)  # the nodes of each side of a cell
     for number, vertices in enumerate(topology):
         first, *others = corners[vertices[:3]]
         places = first + element.points @ np.stack([other - first for other in others])
         local[number] = [int(np.argmin(np.linalg.norm(whole.points - place, axis=1))) for place in places]
-    nodes = space.dofmap.list[beside]
+    nodes, places = space.dofmap.list[beside], space.tabulate_dof_coordinates()
     own = np.take_along_axis(nodes, local[numbers], axis=1)
-    places = space.tabulate_dof_coordinates()
     found = Facets(displacement.dofs[own], places[own], np.ones(len(own)), element)
     middle = found.places(found.rest, np.arange(len(own)), np.full((len(own), 2), 1 / 3))
     outward = np.einsum("ni,ni->n", middle.point - places[nodes].mean(axis=1), middle.normal)

@@ -30,7 +30,7 @@ def test_normals_point_outward_and_areas_add_up(element, region) -> None:
     place = found.places(found.rest, which, np.tile(points, (len(found.dofs), 1)))
     axis, end = "xyz".index(region[0]), int(region[1])
     assert place.normal == pytest.approx(np.tile((2 * end - 1) * np.eye(3)[axis], (len(which), 1)), abs=1e-14)
-    assert place.point[:, axis] == pytest.approx(np.full(len(which), end), abs=1e-15)
+    assert place.point[:, axis] == pytest.approx(np.full(len(which), end), abs=1e-14)
     areas = np.sqrt(np.linalg.det(place.metric)) * np.tile(weights, len(found.dofs))
     assert areas.sum() == pytest.approx(1.0, abs=1e-14)
 
