@@ -143,7 +143,7 @@ def test_points_that_slide_round_an_edge_are_not_lost_and_those_that_go_through_
 
 def test_the_force_falls_steadily_as_a_facet_slides_off_a_sharp_edge() -> None:
     """A plate of two facets slides off a block of its size, 0.02 deep. The force on its points falls with the area that is left,
-    which ends at half of the width of 0.1 facets of 0.5 over which contact fades. It deviates by at most 2.5 % of the whole, as much
+    which ends at half of the width of 0.1 facets of 0.5 over which contact fades. It deviates by at most 2.5 %, as much
     as one point carries; with 16 points in each facet it would be 4.2 %.
     """
     kind = KINDS["P1/P1"][0]
