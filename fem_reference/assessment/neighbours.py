@@ -1,26 +1,33 @@
 """Penetration of muscles into each other: a check for the solved tetrahedra, and a measure for the surfaces of any run."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import combinations
 
 import numpy as np
 
 from fem_reference.assessment.run_checks import ROUNDING, Nodes, RunCheck, RunChecks, worst
-from fem_reference.foundations.mesh import Floats, place_of
+from fem_reference.foundations.mesh import Floats, Surface, TetMesh, boundary, place_of
 from fem_reference.geometry.interpenetration import penetration, skin_of
-from fem_reference.geometry.skins import edge_lengths
+from fem_reference.geometry.quadratic import EDGES
+from fem_reference.geometry.skins import edge_lengths, quartered
 from fem_reference.problems.joining import called
 from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.problems.touching import pressure_name
 from fem_reference.runs.store import Run
 
-# The allowed gap between curved facets of pressed tetrahedra and the flat triangles of their corners, as a share of an edge.
+# The allowed gap between curved facets of pressed tetrahedra and the flat triangles of their corners, as a share of an edge; it
+# falls with the square of the size of triangles.
 _BULGE = 0.05
+# The triangles for each curved facet.
+_PIECES = quartered(quartered(np.eye(3)[None])).reshape(-1, 3)
+Displacement = Callable[[int], Floats | None]
 
 
-def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
+def between(problem: MusclesProblem, run: Run, nodes: Nodes, states: Displacement = lambda _: None) -> RunChecks:
     """The check that no muscle is inside another, by the corners of the tetrahedra, if contact acts or was left out as unneeded.
-    The compliance of contact under its pressure and the bulge of facets are allowed. The check fails if no tetrahedra are stored.
+    The compliance of contact under its pressure and the bulge of facets are allowed. If the corners are too deep, the curved facets
+    decide, of which sixteenths bulge, if the displacement (m, 10, 3) [mm] at a frame is known by ``states``. The check fails if no
+    tetrahedra are stored.
     """
     if not problem.apart:
         return ()
@@ -37,13 +44,28 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes) -> RunChecks:
         name = f"{pair[0].name} and {pair[1].name} in each other"
         for i, number in enumerate(run.numbers):
             give = 0.0 if law is None else float(pressures[i]) / law.stiffness + law.smoothing
-            allowed = ROUNDING * edge + give + (_BULGE * edge if pressures[i] > 0 else 0.0)
+            bulge = _BULGE * edge if pressures[i] > 0 else 0.0
+            allowed = ROUNDING * edge + give + bulge
             if (now := nodes(number)) is None:
                 checks.append(RunCheck(f"{name} (no tetrahedra are stored)", np.nan, allowed, "mm", number))
                 continue
             depth, place = penetration(*(one.moved_to(now[span.points]) for one, span in zip(skins, pair, strict=True)))
+            if bulge and (known := states(number)) is not None and known.shape[1] == 10:
+                curved = (_curved(problem.problems[span.name].mesh, known[span.cells]) for span in pair)
+                (depth, place), allowed = penetration(*curved), allowed - 15 / 16 * bulge
             checks.append(RunCheck(name, depth, allowed, "mm", number, place_of(place)))
     return worst(checks)
+
+
+def _curved(mesh: TetMesh, displacement: Floats) -> Surface:
+    """The boundary of a ``mesh`` with a quadratic ``displacement`` (m, 10, 3) [mm], by 16 triangles for each facet."""
+    facets, cells = boundary(mesh.tets)
+    own = mesh.tets[cells]
+    corners = np.eye(4)[(facets[:, :, None] == own[:, None]).argmax(axis=2)]
+    at = np.einsum("sc,fcb->fsb", _PIECES, corners)  # in barycentric coordinates of the tetrahedron
+    shapes = np.concatenate([at * (2 * at - 1), 4 * at[..., EDGES].prod(axis=-1)], axis=-1)
+    points = at @ mesh.points[own] + shapes @ displacement[cells]
+    return Surface(points.reshape(-1, 3), np.arange(points.size // 3).reshape(-1, 3))
 
 
 def depths(runs: Mapping[str, Run]) -> Iterator[tuple[str, str, Floats]]:

@@ -11,12 +11,14 @@ from pathlib import Path
 from fem_reference.assessment import neighbours, run_checks
 from fem_reference.assessment.body_balance import balance
 from fem_reference.assessment.run_checks import Nodes, RunCheck, RunChecks, of_body, of_muscle, worst
+from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
 from fem_reference.geometry import interpenetration
 from fem_reference.io.texts import plain
 from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.muscles import MusclesProblem
+from fem_reference.runs import states
 from fem_reference.runs.contents import amend
 from fem_reference.runs.store import Frame, Outcome, Run, collected
 from fem_reference.runs.views import run_of
@@ -74,7 +76,14 @@ def _of_all(problem: MuscleProblem | MusclesProblem, run: Run, nodes: Nodes | No
         own = partial(lambda points, number: None if (all_ := at(number)) is None else all_[points], span.points)
         checks = _of_all(problem.problems[span.name], run_of(run, problem, span.name), own)
         found += [replace(one, name=f"{span.name}: {one.name}") for one in checks]
-    return (*found, *neighbours.between(problem, run, at))
+    return (*found, *neighbours.between(problem, run, at, partial(_displacement, run)))
+
+
+def _displacement(run: Run, number: int) -> Floats | None:
+    """The displacement (m, k, 3) [mm] at the nodes of each tetrahedron of a stored ``run``, if its states are stored."""
+    if run.folder is None or not states.are_kept(run.folder, (number,)):
+        return None
+    return states.StoredStates(run.folder, (number,))[number].displacement
 
 
 def confirmed_frames(

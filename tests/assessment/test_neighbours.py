@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from fem_reference.assessment.neighbours import between, depths
 from fem_reference.effects.touching import MuscleContact
 from fem_reference.foundations.mesh import Polylines
+from fem_reference.geometry.quadratic import EDGES
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.problems.touching import pressure_name
@@ -75,3 +76,39 @@ def test_bodies_that_share_a_face_are_not_in_each_other(turn: float) -> None:
     for lift, met in ((1.0, True), (0.999, False)):
         nodes = turned.apply(np.concatenate([mesh.points, mesh.points + [0.0, 0.0, lift]]))
         assert [one.met for one in between(problem, run, lambda _, places=nodes: places)] == [met]
+
+
+def displaced(mesh, by) -> np.ndarray:
+    """The displacement (m, 10, 3) at the nodes of the tetrahedra of a ``mesh``: along z, ``by`` a function of x."""
+    corners = mesh.points[mesh.tets]
+    nodes = np.concatenate([corners, corners[:, EDGES].mean(axis=2)], axis=1)
+    return np.stack([0 * nodes[..., 0], 0 * nodes[..., 0], by(nodes[..., 0])], axis=2)
+
+
+@pytest.mark.parametrize(("dent", "follows", "flat", "curved"), [(0.4, True, False, True), (-0.4, False, True, False)])
+def test_curved_facets_decide_where_they_are_known(dent, follows, flat, curved) -> None:
+    """Two cubes on one another; their common face is bent by a parabola, 0.1 mm deep in its middle, which quadratic displacements
+    represent. As a dent in both, the corners of the finer mesh are 0.1 mm in the flat triangles of the coarser one, although both
+    share the face, to 1/16 of that by its pieces. As a bulge of the lower cube alone it is 0.1 mm in the other, between corners
+    that only touch.
+    """
+    boxes = [shapes.box((1, 1, 1), (1.0, 1.0, 1.0)), shapes.box((2, 1, 1), (1.0, 1.0, 1.0))]
+    boxes[1] = replace(boxes[1], points=boxes[1].points + [0.0, 0.0, 1.0])
+    lines = Polylines(np.array([[0.5, 0.5, 0.1], [0.5, 0.5, 0.9]]), np.array([0, 2]))
+    cubes = [MuscleProblem(shapes.skin(box), (), (), (0,), None, mesh=box, effects=(), fibres=lines) for box in boxes]
+    law = MuscleContact(stiffness="1 MPa/mm", smoothing="0.01 mm")
+    problem = MusclesProblem(dict(zip("ab", cubes, strict=True)), (("a", "b"),), law, apart=True)
+    fields = [lambda x: -dent * x * (1 - x), lambda x: -dent * x * (1 - x) * follows]
+    lifts = [by(box.points[:, 0])[:, None] * [0.0, 0.0, 1.0] for box, by in zip(boxes, fields, strict=True)]
+    nodes = np.concatenate([box.points + lift for box, lift in zip(boxes, lifts, strict=True)])
+    state = np.concatenate([displaced(box, by) for box, by in zip(boxes, fields, strict=True)])
+    surface = cubes[0].surface
+    pressed = {"touching_pressure": np.array([0.001])}
+    run = Run("r", "fenicsx", Outcome("converged", ""), (0,), surface, surface.points[None], scalars=pressed)
+    assert [one.met for one in between(problem, run, lambda _: nodes)] == [flat]
+    assert [one.met for one in between(problem, run, lambda _: nodes, lambda _: state)] == [curved]
+    if not curved:
+        (found,) = between(problem, run, lambda _: nodes, lambda _: state)
+        assert found.value == pytest.approx(0.1, abs=1e-9)  # at a corner of a piece
+    # Linear displacements have no curved facets.
+    assert [one.met for one in between(problem, run, lambda _: nodes, lambda _: state[:, :4])] == [flat]

@@ -40,7 +40,7 @@ def spoiled(name: str) -> tuple[object, ...]:
 # The same muscles attached otherwise, the box of the report beside our own, and a case without a solution take longest: at night.
 AT_NIGHT = (
     *("box_squeeze_report", "gluteus_maximus_anatomical", "gluteus_maximus_tract", "gluteus_medius_anatomical"),
-    *("adductor_brevis", "iliacus_anatomical", "iliacus_in_situ", *UNSOLVED),
+    *("adductor_brevis", "iliacus_anatomical", "iliacus_in_situ", "hip_four_muscles", *UNSOLVED),
 )
 
 
@@ -124,7 +124,7 @@ def test_the_page_of_the_octave_examples(tmp_path, monkeypatch) -> None:
 
 @pytest.mark.nightly
 @pytest.mark.usefixtures("without_page")
-@pytest.mark.parametrize("name", MUSCLES)
+@pytest.mark.parametrize("name", often(MUSCLES))
 def test_several_muscles_meet_their_expectations_and_fail_with_their_negative_control(
     name, tmp_path, monkeypatch
 ) -> None:
@@ -292,12 +292,9 @@ def test_an_unsolved_case_says_where_and_why_and_keeps_what_it_reached(name, tmp
     status, facts = run(scene, tmp_path, monkeypatch)
     assert status == cli.SOLVER_FAILED
     facts = next(iter(facts["muscles"].values())) if scene.parts else facts
-    if facts["status"] == "denied":
-        assert "in each other" in facts["message"]
-    else:
-        assert facts["status"] in ("diverged", "inverted")
-        assert "the smallest det F is" in facts["message"]
-        assert "the deepest contact is" in facts["message"]
+    assert facts["status"] in ("diverged", "inverted")
+    assert "the smallest det F is" in facts["message"]
+    assert "the deepest contact is" in facts["message"]
     reached = [frame for frame, value in rows(facts, "volume", "deviation").items() if value is not None]
     assert reached[:2] == list(scene.frames.numbers[:2])
 
