@@ -248,4 +248,5 @@ def test_a_steep_tip_without_pressure_does_not_converge(tip, own_normals, fem_la
     )
     outcome = solved(fem_lab, body).outcome
     assert outcome.status == ("diverged" if own_normals else "converged")
-    assert ('a point of "high_tip" that rests at (0.5, 0.5, 0.5) mm' in outcome.message) == own_normals
+    said = "that rests at (0.5, 0.5, 0.5) mm", "went through the other side"
+    assert all((one in outcome.message) == own_normals for one in said)
