@@ -212,7 +212,7 @@ ADDED = {
     "error bars of several muscles": 200,
     "one of several muscles, compared from Python": 40,
     "a check of one of several muscles": 30,
-    "the second check of curved facets of several muscles": 30,
+    "the second check of curved facets of several muscles": 40,
     "contact on attached areas": 20,
     "hard cases of several bodies, paths of pressed points": 170,
     "regions in the export to FEBio, the law corotated": 140,

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal, normals
+from fem_reference.geometry.near_pairs import reached
 
 # The distance of a sample point just outside a triangle, as a share of the surface's diagonal.
 _STEP = 1e-5
@@ -87,7 +88,10 @@ def flattened(surface: Surface, place: Floats) -> float:
     """The error of a flat triangle on a curved surface, times the radius of curvature [mm2]. The error is the distance of the
     triangle's middle from a sphere of this radius through its corners; the triangle is the nearest to a ``place`` (3,) [mm].
     """
-    corners = surface.points[surface.triangles[distances(place[None], surface).triangle[0]]]
+    corners = surface.points[surface.triangles]
+    reach = (1 + 1e-9) * float(np.linalg.norm(corners - place, axis=2).min())
+    near = reached(surface, place[None], np.array([reach]))  # a search tree of all triangles would take longer
+    corners = corners[near[distances(place[None], Surface(surface.points, surface.triangles[near])).triangle[0]]]
     return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6
 
 

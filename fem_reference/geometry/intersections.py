@@ -27,11 +27,9 @@ def self_crossings(surface: Surface) -> Ints:
     if not len(found):
         return np.zeros((0, 2), np.int64)
     pairs = some[found]
-    first, second = pairs.T
-    hit = np.zeros(len(pairs), bool)
-    for edges, faces in ((first, second), (second, first)):
-        for corners in ([0, 1], [1, 2], [2, 0]):
-            hit |= _pierces(surface, surface.triangles[edges][:, corners], surface.triangles[faces])
+    one, other = surface.triangles[np.concatenate([pairs, pairs[:, ::-1]])].swapaxes(0, 1)
+    edges = np.concatenate([one[:, [i, (i + 1) % 3]] for i in range(3)])
+    hit = _pierces(surface, edges, np.tile(other, (3, 1))).reshape(6, len(pairs)).any(axis=0)
     return np.asarray(pairs[hit], np.int64)
 
 

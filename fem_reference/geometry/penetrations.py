@@ -8,7 +8,7 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, triangle_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.boxes import bounds
 from fem_reference.geometry.distance import distances, inside
@@ -18,6 +18,8 @@ from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.skins import edge_lengths, quartered
 
 _NORMALS = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
+# The rings of triangles that are searched one by one; further ones at once, by the connected parts of the surface.
+_RINGS = 4
 # The number of points whose winding numbers take as long as building a search tree.
 _FEW = 20
 # A factor on distances that covers their rounding.
@@ -146,14 +148,18 @@ def _of_surface(
 
 def _flood(deep: NDArray[np.bool_], triangles: Ints, crossing: Ints) -> None:
     """Extend the mask ``deep`` (n,) of vertices across all connected ``triangles`` that are not ``crossing``."""
+    if not deep.any():
+        return
     goes_on = np.ones(len(triangles), bool)
     goes_on[crossing] = False
-    while deep.any():
+    for _ in range(_RINGS):
         one, two, three = (deep[corner] for corner in triangles.T)
         grown = triangles[(one | two | three) & ~(one & two & three) & goes_on]
         if not len(grown):
-            break
+            return
         deep[grown] = True
+    part = connected_parts(triangles[goes_on][:, :2].ravel(), triangles[goes_on][:, 1:].ravel(), len(deep))
+    deep |= np.isin(part, part[deep])
 
 
 def _tips(surface: Surface, crossing: Ints) -> Ints:
