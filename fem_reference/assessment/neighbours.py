@@ -25,8 +25,8 @@ Displacement = Callable[[int], Floats | None]
 
 def between(problem: MusclesProblem, run: Run, nodes: Nodes, states: Displacement = lambda _: None) -> RunChecks:
     """The check that no muscle is inside another, by the corners of the tetrahedra, if contact acts or was left out as unneeded.
-    The compliance of contact under its pressure and the bulge of facets are allowed. If the corners are too deep, the curved facets
-    decide, of which sixteenths bulge, if the displacement (m, 10, 3) [mm] at a frame is known by ``states``. The check fails if no
+    The compliance of contact under its pressure and the bulge of facets are allowed. Of muscles that press each other, the curved
+    facets are checked, by sixteenths, if ``states`` knows the displacement (m, 10, 3) [mm] at the frame. The check fails if no
     tetrahedra are stored.
     """
     if not problem.apart:
@@ -49,10 +49,12 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes, states: Displacemen
             if (now := nodes(number)) is None:
                 checks.append(RunCheck(f"{name} (no tetrahedra are stored)", np.nan, allowed, "mm", number))
                 continue
-            depth, place = penetration(*(one.moved_to(now[span.points]) for one, span in zip(skins, pair, strict=True)))
-            if bulge and (known := states(number)) is not None and known.shape[1] == 10:
-                curved = (_curved(problem.problems[span.name].mesh, known[span.cells]) for span in pair)
-                (depth, place), allowed = penetration(*curved), allowed - 15 / 16 * bulge
+            surfaces = [one.moved_to(now[span.points]) for one, span in zip(skins, pair, strict=True)]
+            known = states(number) if bulge else None
+            if known is not None and known.shape[1] == 10:
+                surfaces = [_curved(problem.problems[span.name].mesh, known[span.cells]) for span in pair]
+                allowed -= 15 / 16 * bulge
+            depth, place = penetration(*surfaces)
             checks.append(RunCheck(name, depth, allowed, "mm", number, place_of(place)))
     return worst(checks)
 
