@@ -18,8 +18,7 @@ from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.skins import edge_lengths, quartered
 
 _NORMALS = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-# The rings of triangles that are searched one by one; further ones at once, by the connected parts of the surface.
-_RINGS = 4
+_RINGS = 4  # of triangles that are searched one by one; further ones at once, by the connected parts of the surface
 # The number of points whose winding numbers take as long as building a search tree.
 _FEW = 20
 # A factor on distances that covers their rounding.

@@ -87,8 +87,10 @@ class Facets:
         Newton's method from the middles of the facets; only rough where they are far beyond the edges. Where the method does not
         converge, ``at`` is far beyond the edges: the point would seem near to a facet from which it is far.
         """
-        at, going = np.tile(self.element.points.mean(axis=0), (len(which), 1)), np.arange(len(which))
+        at, going = self._middles(which)
         for i in range(_ITERATIONS):
+            if not len(going):
+                break
             place = self.places(nodes, which[going], at[going])
             away = points[going] - place.point
             gap = np.einsum("ni,ni->n", away, place.normal)
@@ -107,8 +109,10 @@ class Facets:
         """The places where lines through ``points`` (n, 3) [mm] along ``normals`` (n, 3) meet the facets ``which`` (n,), continued
         beyond their edges, by Newton's method as in ``nearest``; and the distances (n,) [mm] along the lines, NaN where they miss.
         """
-        at, going = np.tile(self.element.points.mean(axis=0), (len(which), 1)), np.arange(len(which))
+        at, going = self._middles(which)
         for i in range(_ITERATIONS):
+            if not len(going):
+                break
             place, normal = self.places(nodes, which[going], at[going]), normals[going]
             (u, v), away = np.moveaxis(place.tangents, 1, 0), points[going] - place.point
             size, across = np.linalg.norm(np.cross(u, v), axis=1), np.vecdot(np.cross(u, v), normal)
@@ -119,6 +123,10 @@ class Facets:
         gap = np.vecdot(found.point - points, normals)
         off = np.linalg.norm(found.point - points - gap[:, None] * normals, axis=1)
         return found, np.where(off < _OFF, gap, np.nan)
+
+    def _middles(self, which: Ints) -> tuple[Floats, Ints]:
+        """The coordinates (n, 2) of the middles of facets ``which`` (n,), and the numbers (n,) of these."""
+        return np.tile(self.element.points.mean(axis=0), (len(which), 1)), np.arange(len(which))
 
     def _moved(self, at: Floats, going: Ints, step: Floats, iteration: int) -> Ints:
         """Move the places ``going`` (k,) of ``at`` (n, 2) by a ``step`` (k, 2), shortened if long; return those that go on."""
