@@ -26,6 +26,12 @@ def test_points_spread_evenly_are_those_that_a_scene_would_name() -> None:
         solved(given, via=[{"at": 0.5, "bone": "top"}], via_count=1)
 
 
+def test_more_points_than_a_fibre_has_are_refused_before_they_are_spread() -> None:
+    for count in (10**3, 2**40):  # as many as would not fit into memory
+        with pytest.raises(InputError, match=rf"via_count: got fibre 0 of \d+ points, want .* {count + 2} points"):
+            solved(bar(), via_count=count)
+
+
 def test_the_more_points_the_nearer_to_the_fibre_at_rest() -> None:
     given = bar()
     off = [given.fibres.lengths()[0] - lengths(given, solved(given, via_count=n)[1])[0, 0] for n in (0, 2, 4, 8)]

@@ -118,14 +118,14 @@ class Lines:
 
 def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: str) -> Lines:
     """The lines of a muscle through ``vias`` or ``spread`` points; InputError below ``place`` if the muscle lacks them."""
-    fibres, evenly = problem.fibres, (np.arange(spread) + 0.5) / max(spread, 1)
+    fibres, sizes, count = problem.fibres, np.diff(problem.fibres.offsets), len(vias) + spread
+    if sizes.min() < count + 2:  # before anything is spread, as a number of points may be any number
+        got = f"fibre {sizes.argmin()} of {sizes.min()} points"
+        want = f"fibres of at least {count + 2} points for {count} via-points"
+        raise InputError(join(place, "via_count" if spread else "via"), got, want)
+    evenly = (np.arange(spread) + 0.5) / max(spread, 1)
     places = (0.0, *(via.at for via in vias), *evenly.tolist(), 1.0)
     named = [index(problem.bones, via.bone, join(place, f"via[{i}].bone")) for i, via in enumerate(vias)]
-    parts, sizes = len(places) - 1, np.diff(fibres.offsets)
-    if sizes.min() <= parts:
-        got = f"fibre {sizes.argmin()} of {sizes.min()} points"
-        want = f"fibres of at least {parts + 1} points for {parts - 1} via-points"
-        raise InputError(join(place, "via"), got, want)
     fixed = np.array([along(fibres.points[low:high], list(places)) for low, high in pairwise(fibres.offsets)])
     ends = [nearest_bones(problem, fixed[:, end], place) for end in (0, -1)]
     nearer = [ends[int(at > 0.5)] for at in evenly]
