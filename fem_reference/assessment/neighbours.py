@@ -8,7 +8,7 @@ import numpy as np
 from fem_reference.assessment.run_checks import ROUNDING, Nodes, RunCheck, RunChecks, worst
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, boundary, place_of
 from fem_reference.geometry.interpenetration import penetration, skin_of
-from fem_reference.geometry.quadratic import EDGES
+from fem_reference.geometry.quadratic import EDGES, Displaced
 from fem_reference.geometry.skins import edge_lengths, quartered
 from fem_reference.problems.joining import called
 from fem_reference.problems.muscles import MusclesProblem
@@ -62,11 +62,10 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes, states: Displacemen
 def _curved(mesh: TetMesh, displacement: Floats) -> Surface:
     """The boundary of a ``mesh`` with a quadratic ``displacement`` (m, 10, 3) [mm], by 16 triangles for each facet."""
     facets, cells = boundary(mesh.tets)
-    own = mesh.tets[cells]
-    corners = np.eye(4)[(facets[:, :, None] == own[:, None]).argmax(axis=2)]
+    corners = np.eye(4)[(facets[:, :, None] == mesh.tets[cells][:, None]).argmax(axis=2)]
     at = np.einsum("sc,fcb->fsb", _PIECES, corners)  # in barycentric coordinates of the tetrahedron
     shapes = np.concatenate([at * (2 * at - 1), 4 * at[..., EDGES].prod(axis=-1)], axis=-1)
-    points = at @ mesh.points[own] + shapes @ displacement[cells]
+    points = shapes @ Displaced(mesh, displacement).nodes[cells]
     return Surface(points.reshape(-1, 3), np.arange(points.size // 3).reshape(-1, 3))
 
 

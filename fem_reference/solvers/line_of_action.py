@@ -78,7 +78,11 @@ class Shortest:
         else:
             points = paths.at(passed.part, passed.share)  # as many points as the fibres have
             lost = float((_lengths(passed, paths) - self.problem.fibres.lengths(points)).max())  # as chords are shorter
-            scalars = {"lost_by_chords_max": lost} | self._forces(passed, paths)
+            try:
+                scalars = {"lost_by_chords_max": lost} | self._forces(passed, paths)
+            except InputError as error:  # no fibre of the model is as short or as long
+                self.wrong = Trouble("diverged", str(error))
+                return
             self.found = Frame(number, None, fibres=points, scalars=scalars)
 
     def _forces(self, passed: Passed, paths: Paths | Winding) -> dict[str, float]:

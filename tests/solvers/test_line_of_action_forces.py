@@ -46,6 +46,14 @@ def test_lines_pull_as_hills_muscles_of_their_lengths() -> None:
     assert "muscle_force" not in solved(given)[1][0].scalars
 
 
+def test_a_path_that_no_fibre_spans_ends_the_run_and_keeps_its_frames() -> None:
+    """At 30 km the tendon pulls harder than fibres of three times their optimal length."""
+    outcome, frames = solved(bar(RigidMotion((0, 0, 1), None, (0.0, 5.0, 10.0), (0.0, 6.0, 3e7))), hill=HILL)
+    assert outcome.status == "diverged"
+    assert "frame 10: hill: got a path of 3e+07 mm, want a path on which fibres have 0.1 to 3 times" in outcome.message
+    assert [frame.number for frame in frames] == [0, 5]
+
+
 def exerted(frame: Frame, bone: str) -> tuple[np.ndarray, np.ndarray]:
     """Force [N] and moment about the origin [N mm] on a bone."""
     force, moment = (

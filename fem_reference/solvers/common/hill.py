@@ -67,18 +67,18 @@ class Hill(Record):
 
     def static(self, path: float, activation: float) -> tuple[float, float]:
         """The force [N] and the fibre length [l0] in static equilibrium (zero velocity); of several equilibria, the one with the
-        shortest fibre. A slack tendon has no force. InputError if fibres would be shorter than a tenth of their optimal length.
+        shortest fibre. A slack tendon has no force. InputError if fibres would have less than 0.1 or more than 3 l0.
         """
         low = max(_SHORTEST, 1.0001 * self.thickness)
         if self.tendon_force(path, low) == 0:
             return 0.0, low
         high = min(self._fibre(path, -_SLACK), _LONGEST)
-        low = max(low, self._fibre(path, _strain(1 + passive(high))))  # below, the tendon pulls harder than fibres can
+        low = min(max(low, self._fibre(path, _strain(1 + passive(high)))), high)  # below, the tendon is stronger
         lengths = np.linspace(low, high, 2 + int((high - low) / _STEP))
         pulls = np.array([self.imbalance(path, one, activation) for one in lengths.tolist()]) >= 0
         found = int(np.argmax(pulls))
         if found == 0:
-            want = "a path on which fibres keep at least a tenth of their optimal length"
+            want = f"a path on which fibres have {_SHORTEST:g} to {_LONGEST:g} times their optimal length"
             raise InputError("hill", f"a path of {path:.4g} mm", want)
         bracket = lengths[found - 1], lengths[found]
         fibre = float(scipy.optimize.brentq(lambda one: self.imbalance(path, one, activation), *bracket, xtol=1e-13))

@@ -77,11 +77,8 @@ class TouchingForces:
         sides = [(law, *pair) for law, pairs in both for pair in pairs]
         skins = local_facets(displacement.space.mesh, [beyond_rim(body, *pair) for _, *pair in sides])
         facets = partial(facets_of, displacement, body.mesh)
-        own, passes, rims = (
-            {name: facets(form.regions[name]) for _, name, _ in sides},
-            list[Pass](),
-            list[Pass | None](),
-        )
+        own = {name: facets(form.regions[name]) for _, name, _ in sides}
+        passes, rims = list[Pass](), list[Pass | None]()
         for (law, one, other), around in zip(sides, skins, strict=True):
             felt = law.around and len(around) > 0
             skin = facets(np.concatenate([form.regions[other], around])) if felt else own[other]

@@ -78,8 +78,11 @@ def test_a_static_state_balances_and_slack_pulls_nothing() -> None:
                 shorter = np.linspace(max(0.1, 1.0001 * given.thickness), fibre - 1e-4, 200)
                 assert all(given.imbalance(path, one, activation) < 0 for one in shorter)  # the first of its kind
     assert given.static(100.0, 1.0)[0] == 0
-    with pytest.raises(InputError, match="a tenth of their optimal length"):
+    with pytest.raises(InputError, match=r"0\.1 to 3 times their optimal length"):
         muscle(slack_length="1 mm").static(7.005, 1.0)
+    for far in (1e5, 1e12):  # fibres of 3 l0 pull with 117,000 F0, which strains a tendon by 2,700
+        with pytest.raises(InputError, match=r"0\.1 to 3 times their optimal length"):
+            muscle(slack_length="1 mm").static(far, 1.0)
 
 
 @pytest.mark.parametrize(
