@@ -59,8 +59,6 @@ def fit(surface: Surface, count: int) -> GaussianSurface:
     points on both sides of them, robust against outliers. The fit is deterministic. A rotated or scaled surface gives the
     rotated or scaled fit, up to rounding, if its principal axes are distinct.
     """
-    if count < 2:
-        raise InputError("gaussians", count, "two or more")
     middle, size = surface.points.mean(axis=0), float(np.cbrt(enclosed_volume(surface.points, surface.triangles)))
     axes = _axes(surface.points - middle)
     found = _fit(surface.moved_to((surface.points - middle) @ axes.T / size), count)
@@ -70,6 +68,8 @@ def fit(surface: Surface, count: int) -> GaussianSurface:
 def _fit(surface: Surface, count: int) -> GaussianSurface:
     """The fit to a ``surface`` of volume 1 whose principal axes are the coordinate axes."""
     bounds, inside = np.log(_RADII), _inside(surface)
+    if not 2 <= count <= len(inside):
+        raise InputError("gaussians", count, f"2 to {len(inside)}, as many as the points inside that they begin from")
     centres, found = scipy.cluster.vq.kmeans2(inside, inside[farthest_points(inside, count)], minit="matrix")
     squares = np.bincount(found, ((inside - centres[found]) ** 2).sum(axis=1), count)
     spread = np.maximum(squares / np.maximum(np.bincount(found, minlength=count), 1), 1.01 * np.exp(2 * bounds[0]))

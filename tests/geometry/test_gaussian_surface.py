@@ -85,6 +85,7 @@ def test_farthest_points_spread() -> None:
     assert 0.4 < chosen[1] < 0.6
 
 
-def test_a_single_gaussian_is_refused() -> None:
-    with pytest.raises(InputError, match="two or more"):
-        fit(ellipsoid(), 1)
+@pytest.mark.parametrize("count", [1, 10**5, 10**400], ids=["too_few", "too_many", "far_too_many"])
+def test_too_few_or_more_gaussians_than_points_inside_are_refused(count: int) -> None:
+    with pytest.raises(InputError, match=r"gaussians: got 1.*, want 2 to \d+, "):
+        fit(ellipsoid(), count)
