@@ -20,7 +20,7 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.case import COMMAND, HOME, Candidate, Case, Expectation
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import command, fenicsx, recorded
-from fem_reference.studies import by_muscle, judging, refinement
+from fem_reference.studies import by_muscle, judging, muscle_bars, refinement
 from fem_reference.studies.execution import Bench
 
 
@@ -110,7 +110,7 @@ def check_names(names: list[str]) -> None:
 
 
 def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[C]:
-    """The bench of a case; InputError for wrong expectations, solvers or names, and for error bars of a scalar case."""
+    """The bench of a case; InputError for wrong expectations, solvers or names, and for error bars that are not possible."""
     if options.error_bar and not scene.parts:
         casefile.muscle(scene, "--error-bar")
     check_names([entry.name for entry, _ in chosen])
@@ -118,6 +118,8 @@ def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[t
         judge.check(one)
     bench = Bench(scene, out(options) / "runs", options.ranks)
     bench.check(chosen)
+    if options.error_bar:
+        muscle_bars.check(bench)
     return bench
 
 

@@ -22,8 +22,6 @@ from fem_reference.studies.variations import by_springs, on_larger
 
 log = logging.getLogger(__name__)
 
-_LARGER = "larger tetrahedra"
-
 
 def coarser(case: MusclesCase) -> tuple[MusclesCase, float]:
     """The case with larger tetrahedra in every muscle, and the ratio of the sizes: the same for all, as errors of one muscle
@@ -32,6 +30,14 @@ def coarser(case: MusclesCase) -> tuple[MusclesCase, float]:
     if all(one.refinements for one in muscles_of(case)):
         return with_muscles(case, lambda one: {"refinements": one.refinements - 1}), 2.0
     return on_larger(case, refinement.RATIO), refinement.RATIO
+
+
+def check(bench: Bench[Case]) -> None:
+    """Raise InputError if a case cannot have error bars, because it cannot be set up on larger tetrahedra."""
+    case = bench.scene
+    larger = coarser(cast("MusclesCase", case)) if case.parts else refinement.coarser(bench.of_muscle().scene)
+    with refinement.reported(refinement.LARGER):
+        Bench(cast("Case", larger[0]), bench.store, bench.ranks).problem()
 
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> dict[str, ErrorBars]:
@@ -45,9 +51,11 @@ def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> dict[st
     base, ratio = coarser(own.scene)
     springs = {name: by_springs(part.scene) for name, part in parts.items()}
     with fenicsx.shared():
-        found = refinement.solutions(own, reference, {_LARGER: base}, ratio, model=model and any(springs.values()))
+        found = refinement.solutions(
+            own, reference, {refinement.LARGER: base}, ratio, model=model and any(springs.values())
+        )
     split = {name: other.by_muscle(run) for name, (other, run) in found.items()}
-    fine, coarse, exact = own.by_muscle(reference), split.pop(_LARGER), split.pop(refinement.EXACT, {})
+    fine, coarse, exact = own.by_muscle(reference), split.pop(refinement.LARGER), split.pop(refinement.EXACT, {})
     bars = dict[str, ErrorBars]()
     for name, part in parts.items():
         refinement.check_coarser(part, *(refinement.tets(one[name], called(name, "tets")) for one in (fine, coarse)))

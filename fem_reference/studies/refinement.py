@@ -3,7 +3,8 @@
 import hashlib
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -41,7 +42,7 @@ from fem_reference.studies.variations import (
 
 log = logging.getLogger(__name__)
 
-EXACT = "exact attachments"
+LARGER, EXACT = "larger tetrahedra", "exact attachments"
 # Files, besides the metrics, whose code computes error bars or rejects the runs that they come from.
 _OF_BARS = [
     str(one.__file__) for one in (differences, error_bars, force_bars, views, second_check, run_checks, neighbours)
@@ -226,14 +227,21 @@ def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
     return on_larger(case, RATIO), (size, size * RATIO)
 
 
-def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) -> tuple[Bench[C], Run]:
-    """The bench of a changed scene, and its run over the frames of ``reference``: NaN if not reached or if the run is denied."""
-    other = Bench(case, bench.store, bench.ranks)
+@contextmanager
+def reported(name: str) -> Iterator[None]:
+    """A context in which an InputError names the run for error bars that could not be set up."""
     try:
-        run = other.obtain(f"reference, {name}", without_states(case.reference), "reference")
+        yield
     except InputError as error:
         got = f"a scene that cannot be set up ({error})"
         raise InputError(f"error bar, {name}", got, "a finer reference") from error
+
+
+def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) -> tuple[Bench[C], Run]:
+    """The bench of a changed scene, and its run over the frames of ``reference``: NaN if not reached or if the run is denied."""
+    other = Bench(case, bench.store, bench.ranks)
+    with reported(name):
+        run = other.obtain(f"reference, {name}", without_states(case.reference), "reference")
     if run.outcome.status != "converged":
         log.info("error bar: %s: %s, %s", name, run.outcome.status, run.outcome.message)
     known = second_check.trusted(other.problem, run)  # type: ignore[arg-type]  # a driven case is of muscles

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import small
 import stand_ins
 import two_bars
 from two_bars import AREAS, GIVES, SIZES, growth, swell
@@ -16,7 +17,7 @@ from fem_reference.assessment.error_bars import FILE
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import vertex_areas
 from fem_reference.io import files
-from fem_reference.problems import muscles
+from fem_reference.problems import muscle, muscles
 from fem_reference.report import pages
 from fem_reference.runs.store import Outcome
 from fem_reference.scenes import casefile
@@ -71,6 +72,28 @@ def test_each_muscle_has_bars_of_its_own_pair_with_all_meshes_coarser(two, monke
     for name in ("", "other"):
         with pytest.raises(InputError, match=r"muscle: got \"(other)?\", want one of wide, thin"):
             error_bars(case, reference, muscle=name, store=store)
+
+
+@pytest.mark.parametrize("several", [True, False])
+def test_bars_of_a_mesh_that_cannot_be_coarser_are_refused_before_anything_is_solved(
+    two, monkeypatch, capsys, several
+) -> None:
+    """The mesher finds no part of the surface lost, up to the size that the case asks for."""
+    mesher = muscle.tetrahedralise
+
+    def tetrahedralise(surface, size, shares):
+        if size > max(SIZES.values()):
+            raise InputError("surface", "a part that is lost", "smaller tetrahedra")
+        return mesher(surface, size, shares)
+
+    monkeypatch.setattr(muscle, "tetrahedralise", tetrahedralise)
+    case = two if several else small.write(two / "bar")
+    words = ["run", str(case), "--out", str(two / "out"), "--quiet"]
+    assert cli.main([*words, "--error-bar"]) == cli.BAD_INPUT
+    said = capsys.readouterr().err
+    assert "error bar, larger tetrahedra: got a scene that cannot be set up (" in said
+    assert "a part that is lost, want smaller tetrahedra), want a finer reference" in said
+    assert not list((two / "out").rglob("run.json"))
 
 
 @pytest.mark.parametrize("ended", ["denied", "diverged"])
