@@ -94,10 +94,22 @@ def _each_mesh_is_made_once() -> Iterator[None]:
 
 
 @pytest.fixture
-def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pages are written as where nothing can draw."""
+def without_curves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages of comparisons are written without their curves, which take half of the time."""
+    from fem_reference.report import comparison_page
+
+    def curves(_: Any) -> tuple[()]:
+        return ()
+
+    monkeypatch.setattr(comparison_page, "curves", curves)
+
+
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    """Pages are written as where nothing can draw, and without curves."""
     from fem_reference.report import gallery
 
+    request.getfixturevalue("without_curves")
     monkeypatch.setattr(gallery, "program", lambda _job, _folder: ["/nowhere/python"])
 
 

@@ -51,6 +51,7 @@ def test_reference_without_candidates_has_the_same_page(comparison, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_curves")
 def test_how_well_the_reference_is_known_is_reported(comparison):
     assert "With <code>--error-bar</code> the reference is also solved" in html(comparison)
     text = html(with_bars(comparison))
@@ -86,6 +87,7 @@ def test_how_well_the_reference_is_known_is_reported(comparison):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_curves")
 def test_candidates_are_ranked_where_the_reference_is_known(comparison):
     assert "Ranking by deviation" not in html(comparison)
     known = with_bars(comparison)
@@ -97,6 +99,7 @@ def test_candidates_are_ranked_where_the_reference_is_known(comparison):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_curves")
 def test_a_scene_that_differs_from_its_file_is_reported(comparison):
     damaged = replace(comparison, scene=casefile.read(comparison.scene.place, with_negative_control=True))
     assert "effect[0].mu" not in re.sub(r"<pre>.*</pre>", "", html(comparison), flags=re.DOTALL)
@@ -104,6 +107,7 @@ def test_a_scene_that_differs_from_its_file_is_reported(comparison):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_curves")
 def test_a_reference_turned_inside_out_is_reported(comparison):
     assert "inside out. At" not in html(alone(comparison))
     scalars = {"min_det_F_points": np.array([1, 0.5, -0.25, 0.5, NAN])}
@@ -112,6 +116,7 @@ def test_a_reference_turned_inside_out_is_reported(comparison):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_curves")
 def test_a_reference_that_is_unstable_is_reported(comparison):
     def rendered(modes):
         scalars = {"negative_modes": np.array(modes)}
@@ -124,12 +129,14 @@ def test_a_reference_that_is_unstable_is_reported(comparison):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_curves")
 def test_effects_are_reported_with_their_units(comparison):
     assert comparison.scene.effects[0].parameters == [("mu", 0.01, "MPa")]
     assert "<tr><th>NeoHooke</th><td>mu = 0.01 MPa</td></tr>" in html(comparison)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_curves")
 def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(comparison):
     positions = np.array(comparison.reference.positions)
     positions[3:] = NAN

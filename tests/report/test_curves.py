@@ -49,6 +49,7 @@ def test_candidates_share_one_colour_scale_and_one_axis(comparison):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_curves")
 def test_each_of_nine_candidates_has_a_colour_of_its_own_in_the_key_and_in_the_curves(comparison):
     quick = comparison.candidates[0]
     many = tuple(replace(quick, name=f"quick{i}") for i in range(9))
