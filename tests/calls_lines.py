@@ -55,7 +55,9 @@ def vias(draw: Any) -> Any:
                 [["1 rad"], ["3 rad", "2 rad"], ["1 rad", "1 rad"], ["0 rad", "1e-300 rad"], ["0 rad", "1e6 rad"], []],
             )
         )
-        found |= {"joint": "counter", "curve": [{"angle": angle, "position": draw(points())} for angle in angles]}
+        if isinstance(angles, list):
+            angles = [{"angle": angle, "position": draw(points())} for angle in angles]
+        found |= {"joint": "counter", "curve": angles}
     return draw(odd) if rarely(draw, 60) else found
 
 

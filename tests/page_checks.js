@@ -38,6 +38,7 @@
     .filter(it => ["auto", "scroll"].includes(getComputedStyle(it).overflowX) && it.scrollWidth > it.clientWidth + 1 && !signed(it))
     .map(it => [it.tagName, String(it.className), it.innerText.slice(0, 40)]);
   const open = () => document.querySelectorAll("details").forEach(it => { it.open = true; });
-  const controls = () => [...document.querySelectorAll(".controls, .viewer")].filter(it => it.getClientRects().length).length;
+  const controls = () => [...document.querySelectorAll(".controls, .viewer :is(button, select, input, canvas)")]
+    .filter(it => it.getClientRects().length).map(it => [it.tagName, it.id]);
   window.checks = { pale, wide, cut, unsaid, open, controls };
 })();
