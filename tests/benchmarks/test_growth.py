@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks import candidates, growth
 
-SLOW = {"rbf_muscle": pytest.mark.nightly}
+SLOW = dict.fromkeys(("rbf_muscle", "pbd_program", "arap", "mass_spring"), pytest.mark.nightly)  # by day the others
 POINTS = [{"size": 10.0**k, "iteration": 2e-6 * 100.0**k, "memory": 0.0} for k in range(3)]
 
 
