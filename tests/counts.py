@@ -210,7 +210,7 @@ ADDED = {
     "time limits in standings, hard cases by programs of other people, laws that cannot be split": 110,
     "anatomy out of downloads": 110,
     "error bars of several muscles": 200,
-    "error bars that a case cannot have, refused before anything is solved": 20,
+    "error bars that a case cannot have, refused before anything is solved": 30,
     "one of several muscles, compared from Python": 40,
     "a check of one of several muscles": 30,
     "the second check of curved facets of several muscles": 40,

@@ -34,9 +34,9 @@ def coarser(case: MusclesCase) -> tuple[MusclesCase, float]:
 
 def check(bench: Bench[Case]) -> None:
     """Raise InputError if a case cannot have error bars, because it cannot be set up on larger tetrahedra."""
-    case = bench.scene
-    larger = coarser(cast("MusclesCase", case)) if case.parts else refinement.coarser(bench.of_muscle().scene)
     with refinement.reported(refinement.LARGER):
+        several = cast("MusclesCase", bench.scene)
+        larger = coarser(several) if several.parts else refinement.coarser(bench.of_muscle().scene)
         Bench(cast("Case", larger[0]), bench.store, bench.ranks).problem()
 
 

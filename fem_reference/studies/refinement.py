@@ -3,7 +3,7 @@
 import hashlib
 import logging
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
@@ -32,11 +32,13 @@ from fem_reference.scenes.muscles import exactly_attached
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.variations import (
+    Vary,
     by_springs,
     on_larger,
     on_tetrahedra,
     with_contact,
     with_distances,
+    with_half_steps,
     without_states,
 )
 
@@ -58,8 +60,6 @@ CHEAP = 0.2
 # A quadratic element has as many unknowns on the same cells as a linear one on cells of half the size, and does not lock.
 _QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
 
-type Vary[C] = Callable[[C], C]
-
 
 def variations[C: DrivenCase](
     case: C, settings: Record, *, pressed: bool = True, touched: bool = True
@@ -80,16 +80,8 @@ def variations[C: DrivenCase](
     rubs = any(law.friction is not None for _, law in laws)
     timed = any("interval" in effect.needs for effect in case.effects)
     if (timed or rubs) and "largest_step" in solvers.trades(type(settings)):
-        found["load steps"] = half_steps(case, settings)
+        found["load steps"] = with_half_steps(case, settings)
     return found
-
-
-def half_steps[C: DrivenCase](case: C, settings: Record) -> Vary[C]:
-    """A change to load steps of at most half the length; each step ends at a frame, so ``frames.every`` bounds its length too."""
-    own = settings.model_dump()
-    largest = min(case.frames.every, own["largest_step"] or math.inf) / 2
-    halved = {"first_step": own["first_step"] / 2, "largest_step": largest}
-    return lambda one: one.model_copy(update={"reference": one.reference.model_copy(update=halved)})
 
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars | None:
@@ -233,8 +225,8 @@ def reported(name: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        got = f"a scene that cannot be set up ({error})"
-        raise InputError(f"error bar, {name}", got, "a finer reference") from error
+        got, want = f"a scene that cannot be set up ({error})", "a finer reference"
+        raise InputError(f"error bar, {name}", got, want) from error
 
 
 def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) -> tuple[Bench[C], Run]:

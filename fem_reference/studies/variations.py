@@ -1,7 +1,8 @@
 """Variations of a case: single changes, and the trials of a study, which vary one setting at a time."""
 
 import hashlib
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from fem_reference.effects.incompressible import Incompressible
 from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.foundations.records import Record
 from fem_reference.geometry.coarsening import resampled
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.extension import Extension
@@ -32,6 +34,7 @@ _SIZES = (2.0, 1.6, 1.25, 1.0)
 _COARSER = 1.6
 _REFINED = {0: "not refined", 1: "refined once", 2: "refined twice"}
 _STIFFNESSES, _DISTANCES = (0.1, 0.3, 3.0), (10.0, 3.0, 0.3)
+type Vary[C] = Callable[[C], C]
 
 
 def on_tetrahedra[C: DrivenCase](case: C, **changes: float) -> C:
@@ -62,6 +65,14 @@ def with_distances[C: DrivenCase](case: C, factor: float, *keys: str) -> C:
         for bone in case.bone
     )
     return case.model_copy(update={"bone": tuple(bones)})
+
+
+def with_half_steps[C: DrivenCase](case: C, settings: Record) -> Vary[C]:
+    """A change to load steps of at most half the length; each step ends at a frame, so ``frames.every`` bounds its length too."""
+    own = settings.model_dump()
+    largest = min(case.frames.every, own["largest_step"] or math.inf) / 2
+    halved = {"first_step": own["first_step"] / 2, "largest_step": largest}
+    return lambda one: one.model_copy(update={"reference": one.reference.model_copy(update=halved)})
 
 
 def without_states(choice: SolverChoice) -> SolverChoice:

@@ -22,7 +22,7 @@ from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
 from fem_reference.solvers.common.load_steps import Attempt, StepSizes, march
 from fem_reference.solvers.fenicsx import Settings
-from fem_reference.studies import refinement
+from fem_reference.studies import refinement, variations
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.variations import on_larger
 
@@ -256,7 +256,9 @@ def test_load_steps_are_at_most_half_as_long(case, every, largest) -> None:
     scene = scene_of(case)
     frames = scene.frames.model_copy(update={"last": 90, "every": every})
     settings = Settings(first_step=5.0, largest_step=largest)
-    changed = refinement.half_steps(scene.model_copy(update={"frames": frames}), settings)(scene).reference.settings
+    changed = variations.with_half_steps(scene.model_copy(update={"frames": frames}), settings)(
+        scene
+    ).reference.settings
     taken = [0.0]
     list(
         march(
