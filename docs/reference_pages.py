@@ -255,6 +255,8 @@ def _sections(records: dict[str, list[type[Record]]]) -> str:
 
 
 def _section(title: str, record: type[Record]) -> str:
+    if record is effects.Effect:
+        return f"### {title}\n\nAn effect, written as in a case ([Effects](effects.md#formulas-and-parameters)).\n\n"
     rows = [_row(name, field) for name, field in _fields(record).items()]
     table = "| key | value | default |\n|---|---|---|\n" + "".join(rows) if rows else "It has no keys of its own.\n"
     return f"### {title}\n\n{_markdown(inspect.getdoc(record) or '')}\n\n{table}\n"

@@ -67,7 +67,7 @@ def _fibre_ends_rows() -> str:
         "ends more than 2 mm from their attachment",
         "greatest distance of an end from its bone, 0.5, 1 rad, mm",
     )
-    return table("fibre_ends", ("case", "covered share of attachments, %", "ends", beside, off_bone), rows)
+    return table("fibre_ends", ("case", "covered area of attachments, %", "ends", beside, off_bone), rows)
 
 
 def _fibre_choice(found: dict[str, Any]) -> Any:

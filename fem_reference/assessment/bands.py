@@ -10,20 +10,20 @@ from fem_reference.assessment.gaussian_process import GaussianProcess
 from fem_reference.assessment.uncertainty import Band, Parameter
 from fem_reference.foundations.mesh import Floats
 
-# The greatest error of a surrogate that is used, as a share of the variance.
+# The greatest error of a surrogate that is used, as a fraction of the variance.
 WORST = 0.05
-# The greatest allowed share of missing runs: if more were missing, all of them might lie beyond the 5th or 95th percentile.
+# The greatest allowed fraction of missing runs: if more were missing, all of them might lie beyond the 5th or 95th percentile.
 MISSING = 0.05
 # The least number of runs for percentiles without a surrogate: the 5th and the 95th percentile must lie between values of runs.
 FEWEST = 20
 PERCENTILES = (0.05, 0.5, 0.95)
 _SAMPLES = 15  # the number of samples, as a power of 2
-_SHARE = 1e-6  # the share of the variance of a field that its principal components neglect
+_SHARE = 1e-6  # the fraction of the variance of a field that its principal components neglect
 
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """The ``parameters``, the number of ``wanted`` runs, and the ``points`` (n, d), from -1 to 1, of the runs with answers."""
+    """The ``parameters``, the number of ``wanted`` runs, and the ``points`` (n, d), from -1 to 1, of the runs with results."""
 
     parameters: tuple[Parameter, ...]
     points: Floats
@@ -34,9 +34,9 @@ class Design:
         """The reason why these runs are too few for a band, empty if they are not."""
         made, variables = len(self.points), self.points.shape[1]
         if made < 2 * (variables + 1):
-            return f"{made} runs have answers, but {variables} parameters need at least {2 * (variables + 1)}"
+            return f"{made} runs have results, but {variables} parameters need at least {2 * (variables + 1)}"
         if self.wanted - made > MISSING * self.wanted:
-            lost = f"{self.wanted - made} of {self.wanted} runs have no answer"
+            lost = f"{self.wanted - made} of {self.wanted} runs have no result"
             return f"{lost}: they might all lie beyond the 5th or the 95th percentile"
         return ""
 
@@ -49,7 +49,7 @@ def sampled(variables: int, runs: int, seed: int) -> Floats:
 
 
 def of_values(band: Band, design: Design, values: Floats) -> Band:
-    """The ``band`` filled from the ``values`` (n, f) of the runs, in the frames in which its nominal answer is a number."""
+    """The ``band`` filled from the ``values`` (n, f) of the runs, in the frames in which its nominal result is a number."""
     defined = np.isfinite(band.nominal)
     known = values[:, defined]
     refused = design.refused or _not_numbers(known)
@@ -62,7 +62,7 @@ def of_values(band: Band, design: Design, values: Floats) -> Band:
 
 
 def of_field(band: Band, design: Design, products: Floats) -> Band:
-    """The ``band`` of the root mean square of a field over its weights, from the ``products`` (f, n, n) of the weighted fields of
+    """The ``band`` of the weighted root mean square of a field, from the ``products`` (f, n, n) of the weighted fields of
     each pair of runs in each frame. The surrogate describes the field by its principal components, as the root has a kink at 0.
     """
     if refused := design.refused or _not_numbers(products):

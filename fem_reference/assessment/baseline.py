@@ -46,7 +46,7 @@ README = (
 
 
 class StoredStatistic(Record):
-    """One statistic: ``values`` per frame, the ``tolerance`` of a change and the limit ``within`` of its magnitude, in ``unit``."""
+    """One statistic in ``unit``: ``values`` per frame, ``tolerance`` for a change, and ``within``, the limit on their magnitude."""
 
     tolerance: float = Field(ge=0)
     unit: str

@@ -33,7 +33,7 @@ Forward = Callable[[Sequence[Floats]], Sequence[Floats | None]]
 _MOST = 50
 # The law fits the data if the residuals scatter by at most this many standard deviations of the data.
 FOLLOWED = 2.0
-_ENDED = "a run that the fit needs has no answer"
+_ENDED = "a run that the fit needs has no result"
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ class _Residuals:
         self.values, self.deviations = (np.array([getattr(row, name) for row in rows]) for name in ("value", "sd"))
 
     def at(self, points: Sequence[Floats]) -> list[Floats]:
-        """The residuals (m,) at each point, infinite if the point has no answer."""
+        """The residuals (m,) at each point, infinite if the point has no result."""
         asked = [point for point in points if point.tobytes() not in self.known]
         for point, found in zip(asked, self.forward(asked), strict=True):
             lost = np.full(len(self.values), np.inf)
@@ -170,7 +170,7 @@ def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measur
     residuals = _Residuals(forward, rows)
     start = np.array([min(max(one.place(one.nominal), 0.01), 0.99) for one in parameters])
     try:
-        residuals.slopes(start)  # first, as the fit cannot begin unless these points have answers
+        residuals.slopes(start)  # first, as the fit cannot begin unless these points have results
         found = least_squares(
             lambda point: residuals.at([point])[0],
             start,

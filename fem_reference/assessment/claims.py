@@ -31,7 +31,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Cover:
-    """A ``count`` of claims, the ``share`` of claims whose error is within the bar, and the ``median`` ratio of bar to error."""
+    """A ``count`` of claims, the fraction ``share`` with an error within the bar, and the ``median`` ratio of bar to error."""
 
     count: int
     share: float

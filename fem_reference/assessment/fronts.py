@@ -71,7 +71,7 @@ class Point:
 
     @property
     def load(self) -> float:
-        """The share of the machine that other processes kept busy during its run; NaN if it is unknown."""
+        """The fraction of the machine that other processes kept busy during its run; NaN if it is unknown."""
         return self.costs.get(LOAD, math.nan)
 
     def at(self, error: str, cost: str) -> tuple[float, float] | None:

@@ -28,7 +28,7 @@ class GaussianProcess:
     """The process through outputs (n, q) at ``points`` (n, d) from -1 to 1: logarithms of the length of each variable and of the
     noise (``logs`` (d + 1,)), the ``trend`` (1 + d, q) and the ``weights`` (n, q) of the points.
 
-    ``error``: the mean square error at runs left out of the fit, including that of lengths, as a share of the outputs' variance.
+    ``error``: the mean square error at runs left out of the fit, including that of lengths, as a fraction of the outputs' variance.
     """
 
     points: Floats
@@ -43,12 +43,12 @@ class GaussianProcess:
 
     @property
     def first(self) -> Floats:
-        """The share (d,) of the variance by each variable alone."""
+        """The fraction (d,) of the variance due to each variable alone."""
         return np.asarray(self._shares[0])
 
     @property
     def total(self) -> Floats:
-        """The share (d,) of the variance by each variable, alone and with others."""
+        """The fraction (d,) of the variance due to each variable, alone and with others."""
         return np.asarray(self._shares[1])
 
     @cached_property

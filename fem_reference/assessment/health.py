@@ -88,7 +88,7 @@ def volume(run: Followed) -> Found:
 
 
 def inside_out(run: Followed) -> Found:
-    """Inverted share: of the tetrahedra, if any, in per cent of the volume at rest, else of the surface in per cent of its area.
+    """Inverted fraction: of the tetrahedra, if any, in per cent of the volume at rest, else of the surface in per cent of its area.
     For curved elements, whose corners do not show inversion, the share is 0 or 100 by the least det F.
     """
     if run.least_determinant is not None:

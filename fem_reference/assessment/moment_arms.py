@@ -1,4 +1,4 @@
-"""Moment arms of fibres compared with published arms: a polynomial fit of length against angle, the share of poses whose arm is
+"""Moment arms of fibres compared with published arms: a polynomial fit of length against angle, the fraction of poses whose arm is
 within the fibres' range, and the overlap of two ranges.
 """
 
@@ -52,7 +52,7 @@ def range_of(angles: Floats, arms: Floats) -> ArmRange:
 
 
 def share_inside(curve: Floats, found: ArmRange) -> float:
-    """The share of poses in which the ``curve`` (a,) [mm] is within the range ``found``, among the poses in which it is known; NaN
+    """The fraction of poses in which the ``curve`` (a,) [mm] is in the range ``found``, among the poses in which it is known; NaN
     if it is known in no pose. A range of NaN contains nothing.
     """
     known = np.isfinite(curve)
@@ -100,7 +100,7 @@ class ArmsBeside:
 
     @property
     def share(self) -> float:
-        """The share of poses inside for a curve, else the overlap."""
+        """The fraction of poses inside for a curve, else the overlap."""
         return share_inside(self.published.low, self.found) if self.is_curve else overlap(self.found, self.published)
 
     @property

@@ -44,7 +44,7 @@ class Judgement:
 
     @property
     def used(self) -> float:
-        """The distance as a share of the allowed distance; infinite if this share is not a number."""
+        """The distance divided by the allowed distance; infinite if this ratio is not a number."""
         part = self.away / self.allowed if self.allowed else math.inf
         return 0.0 if self.away == 0 else math.inf if math.isnan(part) else part
 

@@ -42,14 +42,14 @@ class Parameter:
         return float(f"{self.at((place + 1) / 2):.6g}")
 
     def at(self, share: float) -> float:
-        """The value at a ``share`` from 0 to 1 of the range, and beyond it; :meth:`place` is its inverse."""
+        """The value at the fraction ``share`` of the range, from 0 to 1, and beyond it; :meth:`place` is its inverse."""
         if self.spread == "log-uniform":
             with np.errstate(over="ignore"):
                 return float(np.exp(math.log(self.low) + share * math.log(self.high / self.low)))
         return float(self.low + share * (self.high - self.low))
 
     def place(self, value: float) -> float:
-        """The share of the range below a ``value``."""
+        """The fraction of the range below a ``value``."""
         if self.spread == "log-uniform":
             return math.log(value / self.low) / math.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
@@ -70,9 +70,9 @@ class Band:
     ``high`` (f,), and the result of the case, ``nominal``; NaN if the quantity is not defined. ``bar`` (f,): the numerical error
     bar of this result, None if it has none. ``distance``: True for a distance from this result; smaller values are always inside.
 
-    ``error``: the error of the surrogate, as a share of the variance, at runs excluded from its fit; NaN without a surrogate.
+    ``error``: the error of the surrogate, as a fraction of the variance, at runs excluded from its fit; NaN without a surrogate.
     ``by``: the source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: the reason for the lack of a band.
-    ``first`` and ``total``: the share of the variance over all frames by key of the parameter; empty if the surrogate is not
+    ``first`` and ``total``: the fraction of the variance over all frames by key of the parameter; empty if the surrogate is not
     accurate enough (``unreliable``).
     """
 
@@ -124,7 +124,7 @@ class Placed:
 
     @property
     def share(self) -> float:
-        """The share of the frames in which it is inside; NaN if no frame counts."""
+        """The fraction of the frames in which it is inside; NaN if no frame counts."""
         counted = [one for one in self.places if one]
         return counted.count("inside") / len(counted) if counted else math.nan
 

@@ -1,4 +1,4 @@
-"""The verb ``page``: a page on several cases."""
+"""The verb ``page``: a page about several cases."""
 
 import argparse
 from collections.abc import Callable, Iterable
@@ -23,7 +23,7 @@ from fem_reference.studies.execution import Bench
 from fem_reference.verification import runner
 from fem_reference.verification.lab import lab
 
-HELP = "write a page on several cases"
+HELP = "write a page about several cases"
 TABLE = "table-5-1"
 CLAIMS = "error-bars"
 EXAMPLES = "octave-examples"
@@ -47,7 +47,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write a page on several cases."""
+    """Write a page about several cases."""
     takes, write = _PAGES[options.name]
     for option in ("case", "candidate", "unit", "solver_command", "set", "quick", "error_bar", "solve"):
         if getattr(options, option) and option not in takes:

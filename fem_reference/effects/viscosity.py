@@ -27,7 +27,7 @@ class Viscosity(Energy):
     eta: Coefficient
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The lag of a body, as a share of its travel, from its relaxation time."""
+        """The lag of a body, as a fraction of its travel, from its relaxation time."""
         rate = scene.in_time(scene.speed) / scene.length
         deborah = self.eta / scene.shear * rate
         rule, lag = "Deborah number, relaxation time divided by the time of the motion", 0.25 * deborah * scene.travel

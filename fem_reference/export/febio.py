@@ -1,8 +1,8 @@
 """A problem as FEBio's input file (febio_spec 4.0): quadratic tetrahedra, rigid bones moved by load curves, sliding contact.
 
 Based on FEBio's feature manual (febiosoftware/febio-feature-manual) and the sources of FEBio and FEBio Studio that read and write
-such files; FEBio 4.11 was run with exported files. FEBIO.md lists what is equal, and measured differences. Time is the frame number
-minus the first frame number.
+such files; FEBio 4.11 was run with exported files. FEBIO.md lists what is identical, and the measured differences. Time is
+the frame number minus the first frame number.
 """
 
 from collections.abc import Iterable
@@ -34,8 +34,8 @@ from fem_reference.scenes.muscle import MuscleCase
 # The effects that FEBio has in the same form.
 SAME = (NeoHooke, MooneyRivlin, Incompressible, IncompressiblePenalty, FibrePassive, FibrePassiveFebio, Contact)
 LONGEST_STEP = 2.0  # the longest step [frame numbers], as in the runs that FEBIO.md compares
-# Newton's method stops at these shares of displacement and energy of the step's first correction: with a dtol of 1e-3
-# the residual force is 0.4 %.
+# Newton's method stops if a correction is below dtol times the displacement increment of the step so far, and its energy is below
+# etol times that of the first iteration of the step. With a dtol of 1e-3 the residual force is 0.4 %.
 TOLERANCES = {"dtol": 1e-4, "etol": 1e-5}
 
 
@@ -63,7 +63,7 @@ def write(problem: MuscleProblem, folder: Path) -> None:
 
 
 def write_nodes(problem: MuscleProblem, folder: Path) -> None:
-    """Write ``tet10.csv``, for readers of FEBio's nodes, into ``folder``."""
+    """Write ``tet10.csv``, for code that reads FEBio's nodes, into ``folder``."""
     _, tets = febio_mesh.quadratic(problem.mesh)
     rows = "".join(",".join(map(str, row)) + "\n" for row in tets.tolist())
     files.write_text(folder / "tet10.csv", ",".join(f"n{i}" for i in range(10)) + "\n" + rows)
@@ -166,7 +166,7 @@ def _motions(root: Element, problem: MuscleProblem) -> None:
 
 
 def _curve_numbers(problem: MuscleProblem) -> dict[str, int]:
-    """The number of the load curve of each bone that moves: from 2 on without gaps, as FEBio uses it as an index of its list."""
+    """The number of the load curve of each bone that moves: from 2 on without gaps, as FEBio uses it as an index into its list."""
     moving = [bone.name for bone in problem.bones if bone.motion is not None]
     return {name: number for number, name in enumerate(moving, start=2)}
 
@@ -194,7 +194,7 @@ def _curve(data: Element, number: int, kind: str, points: list[tuple[float, floa
 
 
 def _output(root: Element) -> None:
-    """Add the output: displacements for FEBio's viewer, and the muscle's nodes as text."""
+    """Add the output: displacements and stresses for FEBio's viewer, and the muscle's nodes as text."""
     output = SubElement(root, "Output")
     plot = SubElement(output, "plotfile", type="febio")
     SubElement(plot, "var", type="displacement")

@@ -29,18 +29,18 @@ SCALED: dict[type[Effect], tuple[str, ...]] = {
     FibrePassive: ("stress",),
     FibrePassiveFebio: ("c3", "c5"),
 }
-# Parameters in a part differ by at most this factor; fibre parameters below this share of the greatest count as that share.
+# Parameters in a part differ by at most FACTOR; fibre parameters below _LEAST times the greatest are treated as equal to that.
 FACTOR, _LEAST = 1.2, 0.01
-# The parameters of fibres, which end at the border of a region.
+# Parameters of fibre effects; these effects end at the border of a region.
 _OF_FIBRES = ("stress", "c3", "c5")
-# The points of a quadrature of degree 2 in a tetrahedron, by the shares of its corners.
+# The points of a quadrature of degree 2 in a tetrahedron, in barycentric coordinates.
 _NEAR, _FAR = (5 + 3 * 5**0.5) / 20, (5 - 5**0.5) / 20
 _POINTS = np.full((4, 4), _FAR) + (_NEAR - _FAR) * np.eye(4)
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Tetrahedra ``cells`` (k,) of one material, by its ``name``, and its ``effects``, multiplied by their mean share there."""
+    """The tetrahedra ``cells`` (k,) of one material, its ``name``, and its ``effects``, each times its mean share in them."""
 
     name: str
     cells: Ints
@@ -75,7 +75,7 @@ def parts(problem: MuscleProblem) -> tuple[Piece, ...]:
 
 
 def _parameters(problem: MuscleProblem, known: dict[str, Floats]) -> list[tuple[str, Floats]]:
-    """The parameters (m,) of each tetrahedron by key: sums over the effects of a kind; for fibres, by effect."""
+    """The parameters (m,) of each tetrahedron by key: sums over the effects of a kind, but each ``fibre_passive`` by itself."""
     found = dict[tuple[object, str], Floats]()
     for i, effect in enumerate(problem.effects):
         for key in SCALED.get(type(effect), ()):
@@ -103,8 +103,8 @@ def note(problem: MuscleProblem) -> list[str]:
     """A sentence on the parts, if there are regions."""
     many = len(parts(problem))
     text = (
-        f"regions are {many} materials, each for tetrahedra whose parameters are within a factor of {FACTOR:g} (for fibres, "
-        f"where they are at least {_LEAST:.0%} of the greatest). A material has their mean, which is constant in each "
-        "tetrahedron; in the reference, parameters vary between quadrature points"
+        f"regions are represented by {many} materials; in each, the parameters of the tetrahedra differ by at most a factor of "
+        f"{FACTOR:g} (fibre parameters below {100 * _LEAST:g} % of the greatest are not distinguished). A material has the mean of "
+        "these parameters, whereas in the reference they vary between quadrature points"
     )
     return [text] if many > 1 else []

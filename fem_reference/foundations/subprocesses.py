@@ -106,7 +106,7 @@ class MachineTime(NamedTuple):
         return cls(time.perf_counter(), sum(processor_times(os.getpid(), of_ended=True).values()), busy)
 
     def load(self) -> float | None:
-        """The share of the machine that other processes have used since this moment, None if the system does not report it."""
+        """The fraction of the machine that other processes have used since this moment, None if the system does not report it."""
         now = MachineTime.now()
         capacity = (now.seconds - self.seconds) * (os.cpu_count() or 1)
         share = (now.all - self.all - (now.ours - self.ours)) / capacity if capacity > 0 else math.nan

@@ -114,7 +114,7 @@ class Exemption:
 
     @cached_property
     def lost(self) -> float:
-        """The share of the unattached surface that is exempt from contact; 1 if all is attached."""
+        """The fraction of the unattached surface that is exempt from contact; 1 if all is attached."""
         areas = corner_areas(self._places)
         loose = areas.sum() - corner_areas(self.part).sum()
         return float(1 - areas[self.felt].sum() / loose) if loose > 0 else 1.0

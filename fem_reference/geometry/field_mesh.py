@@ -95,7 +95,7 @@ def barycentric_gradients(mesh: FieldMesh) -> Floats:
 
 
 def share_above(mesh: FieldMesh, level: float) -> Floats:
-    """The share (m,) of each triangle's area with y above ``level``."""
+    """The fraction (m,) of each triangle's area with y above ``level``."""
     heights = np.sort(mesh.points[mesh.cells][:, :, 1] - level, axis=1)
     low, middle, high = heights.T
     # The corner alone on its side of the level is cut off; its share of the area is the product of the shares of its two edges.

@@ -13,11 +13,11 @@ from fem_reference.geometry.signed_distance import signed_distances
 # Functions of points (n, 3) [mm] at rest that give shares (n,), from 0 to 1, or depths (n,) [mm] below a border. Picklable.
 Region = Callable[[Floats], Floats]
 Depth = Callable[[Floats], Floats]
-# The slope of the share at a depth of the width, divided by its slope at the border.
+# The slope of the share at the depth ``width``, divided by its slope at the border.
 _RISE = 1000.0
-# Points on the border of a cell are moved by this share of the way to its middle, so that they are in the regions of the cell.
+# Points on the border of a cell are moved by this fraction of the way to its middle, so that they are in the regions of the cell.
 INWARDS = 1e-6
-# The approximate number of sample points in a body of any size.
+# The approximate number of grid points in the bounding box of a body of any size.
 _SAMPLES = 20_000
 
 
@@ -79,8 +79,8 @@ class Around:
 
 @dataclass(frozen=True, eq=False)
 class Between:
-    """The part of a body where a Laplace ``field`` between two attachments is between ``first`` and ``last``; 0 and 1 are the
-    attachments. The depth is the difference of the field from these values divided by its mean slope.
+    """The part of a body where a Laplace ``field`` between two attachments is between ``first`` and ``last``; the field is 0
+    and 1 on the attachments. The depth is the difference of the field from these values divided by its mean slope.
     """
 
     field: FibreField
@@ -98,7 +98,7 @@ class Between:
 
 
 def samples(surface: Surface) -> Floats:
-    """About 20,000 points (n, 3) [mm] of a regular grid inside a closed ``surface``, which all represent the same volume."""
+    """Points (n, 3) [mm] inside a closed ``surface``, of equal volume each: of a grid of about 20,000 in the bounding box."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     step = np.cbrt(np.prod(high - low) / _SAMPLES)
     axes = [np.linspace(a, b, 2 * max(1, round((b - a) / step)) + 1)[1::2] for a, b in zip(low, high, strict=True)]

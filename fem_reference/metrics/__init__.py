@@ -24,7 +24,7 @@ from fem_reference.problems.setup import Bone, Joint, Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Part, Standard
 
-# Places where pages show a statistic. ``main``: notebooks and omitted effects; ``table``: the first table of a comparison;
+# Places where pages show a statistic. ``main``: notebooks and the page of omitted effects; ``table``: a comparison's first table;
 # ``headline``: its summary; ``curve``: plots of changes from rest; ``angle``: plots over a joint's angle; ``solvers``: tables of
 # solvers; ``scenes``: the table of all scenes; ``rank``: rankings of solvers; ``claim``: error bars compared with true errors.
 Shown = Literal["main", "table", "headline", "curve", "angle", "solvers", "scenes", "rank", "claim"]
@@ -35,10 +35,10 @@ class Statistic:
     """The description of a statistic by its metric.
 
     ``title`` and ``part``: headings of the group of columns and of the column. ``headline``: a sentence with ``{}`` for the value.
-    ``curve``: the title of the plot of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: its rank by
-    place, from the least. ``local``: True if its error has the order of the error at the worst point. ``lone``: True for the value
-    of a single fibre or of the force on a bone, which is not a mean. ``pooled``: True if the statistics of its metric belong to one
-    field in one unit; the rms of all then replaces a difference that is small by chance.
+    ``curve``: the title of the plot of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: its position in the
+    order at each place, the lowest first. ``local``: True if its error converges with the order of that at the worst point.
+    ``lone``: True for the value of a single fibre or of the force on a bone, which is not a mean. ``pooled``: True if statistics of
+    its metric belong to one field in one unit; the rms of all then replaces a difference that is small by chance.
     """
 
     unit: str
@@ -288,7 +288,7 @@ def rms(deviations: Floats, weights: Floats) -> Floats:
 
 
 def percentile(values: Floats, weights: Floats, share: float) -> float:
-    """The least of ``values`` (n,) that a ``share`` of the weight does not exceed; NaN if one is not finite."""
+    """The smallest of ``values`` (n,) up to which they have at least a ``share`` of the weight; NaN if one is not finite."""
     if not np.isfinite(values).all():
         return float("nan")
     order = np.argsort(values)

@@ -17,7 +17,7 @@ OF, AGAINST = "surface", "reference"
 
 
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """Shares of the surface, by its area at rest, minus the shares in the reference [%]. ``inside_out``: triangles whose outer side
+    """Fractions of the surface, by its area at rest, minus those in the reference [%]. ``inside_out``: triangles whose outer side
     faces a part of the body that is turned inside out; ``overlapping``: triangles inside another part of the body.
 
     NaN in a frame where a triangle has collapsed: it has no outer side.

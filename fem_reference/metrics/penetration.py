@@ -140,7 +140,7 @@ def _alike(bone: Bone, name: str, bones: tuple[Bone, ...], numbers: tuple[int, .
 
 
 def _without_inside(bones: tuple[Bone, ...]) -> str:
-    """The bone that has no inside, and the reason; an empty text if every bone has an inside."""
+    """The bone that has no inside, and the reason; an empty string if every bone has an inside."""
     for bone in bones:
         try:
             _ = bone.shape

@@ -70,14 +70,14 @@ class ContactLaw:
         return np.where(pressure > k * d, -pressure / k, d - 2 * np.sqrt(d * pressure / k))
 
     def allowance(self, frame: float) -> float:
-        """The share of the overlap at rest that is subtracted at ``frame``."""
+        """The fraction of the overlap at rest that is subtracted at ``frame``."""
         if self.relaxed is None:
             return float(self.in_situ is not None)
         return remaining(self.relaxed, frame)
 
 
 def remaining(relaxed: tuple[float, float], frame: float) -> float:
-    """The share of an overlap at rest that is left at ``frame`` if it is removed between two frame numbers."""
+    """The fraction of an overlap at rest that is left at ``frame`` if it is removed between two frame numbers."""
     first, last = relaxed
     return float(np.clip((last - frame) / (last - first), 0, 1))
 

@@ -21,7 +21,7 @@ SIDES = ("first", "last")  # the ends of a fibre
 class FibreEnds:
     """The first and the last end of k fibres. ``by`` (k, 2): the index in ``attached`` of the attachment of each end. ``distance``
     (k, 2) [mm]: its distance from the attached area at rest; ``closest`` (k, 2, 3) [mm]: the closest point of this area.
-    ``covered`` (a,): the share of the area of each attachment within the mean spacing of fibres, sqrt(area / k), of an end that
+    ``covered`` (a,): the fraction of the area of each attachment within the mean spacing of fibres, sqrt(area / k), of an end that
     belongs to it. If an end does not reach its attachment, the fibre continues as the tendon of the attachment, if there is one.
     """
 
@@ -143,7 +143,7 @@ def _steps(start: Floats, end: Floats) -> Floats:
 
 
 def _covered(part: Floats, ends: Floats, fibres: int) -> float:
-    """The share of the area of triangles ``part`` (r, 3, 3) whose centroid is within the mean fibre spacing of ``ends`` (m, 3)."""
+    """The fraction of the area of triangles ``part`` (r, 3, 3) with centroids within the mean fibre spacing of ``ends`` (m, 3)."""
     areas = corner_areas(part)
     if len(ends) == 0 or not areas.sum():
         return 0.0

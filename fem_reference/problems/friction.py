@@ -45,7 +45,7 @@ def returned(slip: Floats, limit: Floats, stiffness: float) -> Returned:
 
 
 def since_entry(gap: Floats, before: Floats, felt: float) -> tuple[Floats, Floats]:
-    """The share (n,) of a straight path that lies within contact, and its derivative (n,) with respect to ``gap``. The gap
+    """The fraction (n,) of a straight path that lies within contact, and its derivative (n,) with respect to ``gap``. The gap
     decreases from ``before`` (n,) [mm], at least ``felt`` [mm], to ``gap`` (n,) [mm], below ``felt``.
     """
     whole = before - gap

@@ -157,7 +157,7 @@ def _prescribed(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> Iter
 
 
 def _moved(skin: Skin, first: int) -> Skin:
-    """The ``skin`` with its cells renumbered to begin with number ``first``."""
+    """The ``skin`` with ``first`` added to its cell numbers."""
     return replace(skin, cells=skin.cells + first)
 
 

@@ -31,7 +31,7 @@ class Part:
 @dataclass(frozen=True)
 class Asked:
     """A page as a command requests it: the ``verb``, the ``base`` of its default name, the ``parts`` that determine it, and the
-    name ``page`` of its file if it has its own folder, else an empty text.
+    name ``page`` of its file if it has its own folder, else an empty string.
     """
 
     verb: str

@@ -14,7 +14,7 @@ def text(found: Calibration) -> str:
     ]
     for one in found.failures:
         values = ", ".join(f"{key} = {value:g}" for key, value in one.values.items())
-        lines.append(f"  no answer: {one.status}: {one.message} ({values})")
+        lines.append(f"  no result: {one.status}: {one.message} ({values})")
     if found.ended:
         lines.append(f"  no fit: {found.ended}{'; the best point so far:' if found.estimates else ''}")
         best = [f"  {one.parameter.title}: {one.value:.5g} {one.parameter.unit}".rstrip() for one in found.estimates]

@@ -111,7 +111,7 @@ def read(path: Path) -> PageHead | None:
 
 def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]:
     """The ``name``, with a number if needed, for which ``where(name)`` has no page or one made by the same command; and a
-    line that reports an existing page, else an empty text.
+    line that reports an existing page, else an empty string.
     """
     for i in count(1):
         numbered = name if i == 1 else f"{name}-{i}"

@@ -1,4 +1,4 @@
-"""The page ``table-5-1``: speed and precision of solvers in numbers; the report rates them with plus and minus signs."""
+"""The page ``table-5-1``: speed and accuracy of solvers in numbers; the report rates them with plus and minus signs."""
 
 import math
 from typing import Any

@@ -148,10 +148,10 @@ def shares(found: Uncertainty, band: Band) -> Drawing:
 def text(found: Uncertainty) -> str:
     """The bands of a case as lines of text."""
     lost = len(found.failures)
-    lines = [f"{found.case}: {found.runs} runs, {lost} without an answer; {len(found.parameters)} parameters"]
+    lines = [f"{found.case}: {found.runs} runs, {lost} without a result; {len(found.parameters)} parameters"]
     for one in found.failures:
         at = ", ".join(f"{key} = {value:g}" for key, value in one.values.items())
-        lines.append(f"  no answer: {one.status}: {one.message} ({at})")
+        lines.append(f"  no result: {one.status}: {one.message} ({at})")
     for band in found.bands:
         if band.refused:
             lines.append(f"  {band.title}: no band: {band.refused}")

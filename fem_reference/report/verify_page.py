@@ -91,14 +91,14 @@ def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
 
 
 def share(one: Result) -> float:
-    """The error as a share of its bound; NaN if nothing was measured, infinite for an error if no error is allowed."""
+    """The error divided by its bound; NaN if nothing was measured, infinite for an error if no error is allowed."""
     if one.within > 0:
         return one.error / one.within
     return one.error * math.inf if one.error else 0.0
 
 
 def overview(groups: dict[str, list[Result]]) -> Drawing:
-    """The error of every result as a share of its tolerance, group by group."""
+    """The error of every result divided by its tolerance, group by group."""
     results = [one for group in groups.values() for one in group]
     shown = [share(one) for one in results if LEAST <= share(one) <= GREATEST]
     low = 10.0 ** math.floor(math.log10(min([0.1, *shown]))) / 3
@@ -118,12 +118,12 @@ def overview(groups: dict[str, list[Result]]) -> Drawing:
         _style_overview(figure, axes, (low, high))
 
     rows = len(results) + len(groups)
-    title = "Error as a share of the tolerance"
+    title = "Error divided by the tolerance"
     return drawn("verify-overview", title, (9.6, 0.9 + _ROW * rows), draw)
 
 
 def _dot(axes: Axes, row: int, one: Result, limits: tuple[float, float]) -> None:
-    """Draw a result at its share of the tolerance: a hollow triangle if it is beyond the edge, a cross if it is not a number."""
+    """Draw the error of a result by its tolerance: a hollow triangle if it is beyond the edge, a cross if it is not a number."""
     low, high = limits
     value = share(one)
     look: dict[str, Any] = {"color": PASS if one.word == "pass" else FAIL, "clip_on": False, "markersize": 5.5}

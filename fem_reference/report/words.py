@@ -8,7 +8,7 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float | None) -> str:
-    """A number with three significant digits; from 1000 to 10^7, a rounded integer.
+    """A number with three significant digits; where these would round to 1000 or more, up to 10^7, a rounded integer.
 
     >>> number(0.12345), number(12.3456), number(0), number(float("nan"))
     ('0.123', '12.3', '0', 'not a number')
@@ -24,7 +24,7 @@ def number(value: float | None) -> str:
     if size != 0 and not 1e-4 <= size < 1e7:
         mantissa, power = f"{size:.2e}".split("e")
         return f"{sign}{mantissa} {_TIMES} 10{str(int(power)).translate(_SUPERSCRIPT)}"
-    if size >= 1000:
+    if size >= 999.5:
         return sign + f"{size:,.0f}".replace(",", _THIN)
     return sign + (f"{size:.0f}" if size == int(size) else f"{size:#.3g}".rstrip("."))
 
@@ -39,12 +39,11 @@ def duration(seconds: float | None) -> str:
         return _DASH
     if seconds >= 600:
         return f"{number(seconds / 60)} min"
-    return f"{number(seconds)} s" if seconds >= 1 or not seconds > 0 else f"{number(seconds * 1000)} ms"
+    return f"{number(seconds * 1000)} ms" if 0 < seconds * 1000 < 999.5 else f"{number(seconds)} s"
 
 
 def under_load(shares: Iterable[float], most: float) -> str:
-    """A warning if other processes kept more than the share ``most`` of the machine busy while times were measured; a share of NaN
-    is unknown.
+    """A warning if other processes kept more than ``most`` of the machine busy while times were measured; NaN: unknown.
 
     >>> under_load([0.02, 0.5, 0.25], 0.1)
     '2 of 3 times were measured while other processes kept 25 % to 50 % of the machine busy: undisturbed runs take less time'

@@ -77,7 +77,7 @@ class Expectation(Record):
 
 
 class NegativeControl(Record):
-    """One change of this case that must turn its verdict to fail: the ``key`` to change and its ``value``."""
+    """One change of this case with which its verdict must be fail: the ``key`` to change and its new ``value``."""
 
     key: str
     value: str | int | float

@@ -21,7 +21,7 @@ class PolylineFile(Record):
 
 
 class Traced(Record):
-    """Fibres traced along the gradient of a Laplace field from the attachment ``start`` to ``end``.
+    """Fibres traced along gradient lines of a Laplace field from the attachment ``start`` to ``end``.
 
     With ``flux = "area"`` the flux per area of an attachment is constant, and fibres cover both attachments. Without it, the field
     is 0 on the start and 1 on the end, and fibres are concentrated at the rims of wide attachments.

@@ -112,8 +112,8 @@ class Rod(Record):
 
 class CaseBone(Record):
     """A rigid body: a ``surface`` in a file with coordinates in ``unit``, or exactly one of the closed forms; without ``motion``
-    it rests. ``distance_error``: the allowed error of the distance to a surface, root mean square near it, before rounding.
-    ``distance_rounding``: the standard deviation of a Gaussian mean of this distance, as flat triangles prevent smooth sliding.
+    it rests. ``distance_error``: the allowed root-mean-square error of the distance, near the surface and before smoothing.
+    ``distance_rounding``: the standard deviation of a Gaussian filter of this distance, as flat triangles prevent smooth sliding.
     """
 
     name: Name
@@ -153,7 +153,7 @@ class CaseJoint(Record):
 
 class Muscle(Record):
     """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often each is cut into eight.
-    ``mesher``: ``"quality"`` for well-shaped tetrahedra, or ``"block"`` for a box along the axes: a grid of boxes cut into six.
+    ``mesher``: ``"quality"`` for well-shaped tetrahedra, or ``"block"`` for a box along the axes: boxes, each cut into six.
     """
 
     surface: str
@@ -197,7 +197,7 @@ class Landmarks(Record):
 
 class Attachment(Record):
     """The part of the muscle surface that is attached to a bone, given by exactly one of ``vertices``, ``within`` (a distance from
-    the bone) and ``outline``. Springs of a ``stiffness`` attach its area; without a stiffness it moves exactly with the bone.
+    the bone) and ``outline``. With a ``stiffness``, springs attach it to the bone; without, it moves exactly with the bone.
     Fibres that end beside it continue to a point of the bone as a straight ``tendon``, which pulls only with the effect ``tendon``.
     """
 
@@ -236,7 +236,7 @@ class Frames(Record):
 
 
 class Uncertain(Range):
-    """The range of the number of the case at a ``key``, such as ``effect[0].mu``, instead of the range stated by the effect."""
+    """The range of the number at a ``key`` of the case, such as ``effect[0].mu``, instead of the range stated by the effect."""
 
     key: str
 

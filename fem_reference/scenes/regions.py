@@ -50,7 +50,7 @@ class ShareOfField(Record):
     first: float = Field(ge=0, lt=1)
     last: float = Field(gt=0, le=1)
 
-    _check_last = key_rule("last", lambda last, keys: last > keys.get("first", 0), "more than the first")
+    _check_last = key_rule("last", lambda last, keys: last > keys.get("first", 0), "a number greater than `first`")
 
 
 class CaseRegion(Record):

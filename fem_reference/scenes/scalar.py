@@ -27,7 +27,7 @@ class Interval(Record):
 
 
 class MeshFiles(Record):
-    """Triangles in the format of listing 4.5: comma-separated files without a header.
+    """Triangles in the format of listing 4.5 of the report: comma-separated files without a header.
 
     ``points``: a row of 2 or 3 coordinates for each vertex; ``triangles``: a row of three vertices, counted from 1, for each
     triangle, or the word ``delaunay`` for a triangulation of points in the plane.
@@ -58,10 +58,10 @@ class Domain(Record):
 class Boundary(Record):
     """A boundary condition, in one of two forms.
 
-    The first form is ``on`` an end of an interval or the ``rim`` of triangles: the ``value`` of the field (Dirichlet) or its
-    ``slope`` along the outward normal (Neumann). A formula ``where`` limits it to facets at whose vertices its value is above zero.
-    The second form is ``bounds``, a file in the format of listing 4.5: a row of vertices, counted from 1, and a row of their fixed
-    values. On all other parts of the boundary the slope is 0.
+    The first form applies ``on`` an end of an interval or on the ``rim`` (the boundary) of a triangle mesh. It gives the ``value``
+    of the field (Dirichlet) or its ``slope`` along the outward normal (Neumann). A formula ``where`` limits it to facets at whose
+    vertices the formula is positive. The second form is ``bounds``, a file in the format of listing 4.5 of the report: a row of
+    vertices, counted from 1, and a row of their fixed values. On all other parts of the boundary the slope is 0.
     """
 
     on: Literal["left", "right", "rim"] | None = None

@@ -164,7 +164,7 @@ def colliding_bones(bones: Sequence[Bone], rest: Floats, attached: Ints, gap: fl
 def move_out(points: Floats, bones: Sequence[CollidingBone], stiffness: float) -> None:
     """Move ``points`` (n, 3) [mm] in place out of all bones, each by the sum of its displacements out of the bones that contain it.
 
-    ``stiffness`` is the share of each displacement that is applied. Masses cancel, as each constraint has a single vertex.
+    ``stiffness`` is the fraction of each displacement that is applied. Masses cancel, as each constraint has a single vertex.
     """
     moves = np.zeros_like(points)
     for one in bones:

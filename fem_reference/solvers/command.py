@@ -48,7 +48,7 @@ class CommandSettings(Record):
     ``unit``: the unit of length of the frames, by default the unit in a ``candidate.toml`` next to them, otherwise mm. ``version``:
     the version of the program. ``files``: files and folders that determine the results, in addition to those named in the command.
     ``moves``: the mesh whose points the program moves. ``time_limit``: the limit on processor time. ``directory``: the working
-    directory. ``ladder``: useful values of settings, from the fastest to the most accurate.
+    directory. ``ladder``: for some settings, a series of values from the fastest to the most accurate.
     """
 
     model_config = ConfigDict(protected_namespaces=())
@@ -104,8 +104,9 @@ def _filled(settings: CommandSettings, places: Mapping[str, Path]) -> list[str]:
 
 
 class Description(recorded.About):
-    """The contents of ``candidate.toml`` next to a program. ``law``: the effect that is its material, on linear tetrahedra with a
-    Poisson's ratio of at most its setting ``poisson``; ``takes``: further effects that it models.
+    """The contents of ``candidate.toml`` next to a program. ``law``: the effect that the program uses as its material law, on
+    linear tetrahedra, with a Poisson's ratio of at most the setting ``poisson``; ``takes``: further effects that it models.
+    ``settings``: the values of the settings in the command. ``files``, ``ladder``, ``moves``, ``time_limit``: as for ``command``.
     """
 
     settings: dict[str, Value] = Field(default_factory=dict)

@@ -2,7 +2,7 @@
 
 A projection (``project_``) moves ``points`` (n, 3) [mm] in place by report eq. 5.14 weighted with the inverse masses w (n,),
 ``dp_i = -stiffness w_i grad_i C / (sum_j w_j |grad_j C|^2) C``, one constraint after the other in the order of the
-arrays (Gauss-Seidel), so the result depends on this order. ``stiffness`` is the share of C that one projection removes, to first
+arrays (Gauss-Seidel), so the result depends on this order. ``stiffness`` is the fraction of C that one projection removes, to first
 order. Arrays should be writable and C-contiguous: the loops are compiled again for any other kind.
 
 In extended position based dynamics (``pull_``; Macklin, Mueller and Chentanez 2016, DOI 10.1145/2994258.2994272) C stands for the

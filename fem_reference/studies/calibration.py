@@ -111,7 +111,7 @@ def _split(quantity: str) -> tuple[str, str, str]:
 
 
 def _made(varied: Unknowns, values: Sequence[dict[str, float]], store: Path, workers: Workers) -> list[Run | Failure]:
-    """The runs of the case with other ``values`` by key; a ``Failure`` for each without an answer."""
+    """The runs of the case with other ``values`` by key; a ``Failure`` for each without a result."""
     found, trials = dict[int, Run | Failure](), dict[int, Trial]()
     for i, one in enumerate(values):
         said = ", ".join(f"{key} {value:.6g}" for key, value in one.items())

@@ -106,7 +106,7 @@ def hashes(folder: Path) -> dict[str, str]:
 
 
 def _scene(folder: Path, wanted: Sizes, store: Path, name: str) -> str:
-    """Make the scene ``name`` of a data set; return the reason if it is left out, after removing its folder, else an empty text."""
+    """Make the scene ``name`` of a data set; return the reason if it is left out, after removing its folder, else ""."""
     place = folder / "scenes" / name
     try:
         if name in wanted.shipped:

@@ -236,6 +236,6 @@ def crossings(lines: Polylines) -> int:
 
 
 def _along(line: Floats, left_out: float = 0.0) -> Floats:
-    """Sample points (400, 3) along a ``line`` (k, 3), without the share ``left_out`` at either end."""
+    """Sample points (400, 3) along a ``line`` (k, 3), without the fraction ``left_out`` at either end."""
     at = np.linspace(left_out, 1 - left_out, _SAMPLED) * (len(line) - 1)
     return np.stack([np.interp(at, np.arange(len(line)), line[:, axis]) for axis in range(3)], axis=1)

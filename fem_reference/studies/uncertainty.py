@@ -78,7 +78,7 @@ def _nominal(case: MuscleCase, reference: Run, store: Path, workers: Workers) ->
 
 
 def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iterator[Band]:
-    """The band of each quantity that the case has, from the ``runs`` of the ``design`` that have answers."""
+    """The band of each quantity that the case has, from the ``runs`` of the ``design`` that have results."""
     whole = [complete(run, comparison.reference.numbers) for run in runs]
     context = comparison.context
     assert isinstance(context, MeasurementContext)  # the case is of a muscle

@@ -81,7 +81,7 @@ def departure(lab: Lab, spectral_radius: float) -> Finding:
     return Finding(float(np.abs(total).max() / kinetic.max()), note=note)
 
 
-# A smooth pull along x: ``10 s^3 - 15 s^4 + 6 s^5`` of a distance [mm], where s is the share of the frames that have passed.
+# A smooth pull along x: ``10 s^3 - 15 s^4 + 6 s^5`` of a distance [mm], where s is the fraction of the frames that have passed.
 FRAMES, WAY = 64, 1e-4 * LENGTH
 SMOOTH = Polynomial((0, 0, 0, 10, -15, 6))
 PULL = Affine(NO_GRADIENT, (WAY, 0.0, 0.0), tuple((float(i), float(SMOOTH(i / FRAMES))) for i in range(FRAMES + 1)))

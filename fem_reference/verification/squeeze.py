@@ -47,7 +47,7 @@ def plated(lab: Lab, element: str, bulk: float, path: Affine, numbers: tuple[flo
 
 
 def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: float = 1.0) -> tuple[Frame, ...]:
-    """All states of the block on the path down and on a share ``back`` of the return: at even load steps, or, if the steps are
+    """All states of the block on the path down and on the fraction ``back`` of the return: at even load steps, or, if the steps are
     ``growing``, at the ends of both paths.
     """
     path = Affine(NO_GRADIENT, (0.0, 0.0, HEIGHT - 1), ((0.0, 0.0), (1.0, 1.0), (2.0, 1 - back)))
@@ -77,7 +77,7 @@ def volume(lab: Lab, element: str, bulk: float) -> Finding:
 
 
 def distance_from_rest(lab: Lab, element: str, bulk: float, *, growing: bool, back: float = 1.0) -> Finding:
-    """The largest distance [mm] of a node from rest when the plate is at the share ``back`` of its return."""
+    """The largest distance [mm] of a node from rest when the plate is at the fraction ``back`` of its return."""
     states = smooth(lab, element, bulk, growing=growing, back=back)
     return _finding(farthest(states[-1].points, states[0].points), states)
 

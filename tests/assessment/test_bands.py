@@ -81,7 +81,7 @@ def test_a_band_out_of_too_few_runs_is_refused(lost: int, there: bool) -> None:
     own = design(64, lost=lost)
     found = of_values(empty(), own, own.points[:, :1] * [1.0, 1.0, 1.0])
     assert (found.refused == "") is there
-    assert there or "4 of 64 runs have no answer: they might all lie beyond" in found.refused
+    assert there or "4 of 64 runs have no result: they might all lie beyond" in found.refused
 
 
 def test_fewer_runs_than_parameters_need_are_refused() -> None:

@@ -148,7 +148,7 @@ def test_a_point_without_an_answer_is_stepped_back_from() -> None:
 
 def test_a_start_without_an_answer_ends_a_fit_and_nothing_is_claimed() -> None:
     found = fit(lambda points: [None for _ in points], (K1,), data(np.arange(1.0, 11.0)), "k")
-    assert (found.ended, found.estimates, found.converged) == ("a run that the fit needs has no answer", (), False)
+    assert (found.ended, found.estimates, found.converged) == ("a run that the fit needs has no result", (), False)
     assert np.isnan(found.scatter)
     assert not found.holds
     assert found.runs == 2

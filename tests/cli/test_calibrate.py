@@ -1,4 +1,4 @@
-"""The verb ``calibrate``: bad input ends with 2, a fit that does not hold with 1, and one that has no answers with 3."""
+"""The verb ``calibrate``: bad input ends with 2, a fit that does not hold with 1, and one that has no results with 3."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +21,7 @@ KNOWN = found(1.0, Estimate(MU, 0.011, 0.0105, 0.0115))
         (replace(KNOWN, scatter=3.0), 1),
         (replace(KNOWN, scatter=float("nan")), 1),
         (replace(KNOWN, converged=False), 1),
-        (replace(KNOWN, ended="a run that the fit needs has no answer"), 3),
+        (replace(KNOWN, ended="a run that the fit needs has no result"), 3),
     ],
 )
 def test_the_status_says_whether_the_fit_holds(

@@ -33,7 +33,7 @@ def test_the_quick_size_is_varied_except_for_what_is_set(
 
 
 def test_a_band_that_is_missing_is_a_failure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    refused = study(replace(band(), refused="12 of 64 runs have no answer"))
+    refused = study(replace(band(), refused="12 of 64 runs have no result"))
     monkeypatch.setattr(uncertainty, "study", lambda *_: refused)
     assert cli.main(["uncertainty", "hip_flexion", "--out", str(tmp_path)]) == 3
 

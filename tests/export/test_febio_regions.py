@@ -117,7 +117,9 @@ def test_without_regions_the_muscle_is_one_part() -> None:
 
 def test_the_file_says_what_a_region_is_there(problem: MuscleProblem) -> None:
     many = len(febio_regions.parts(problem))
-    assert any(text.startswith(f"regions are {many} materials") for text in febio_contact.notes(problem))
+    assert any(
+        text.startswith(f"regions are represented by {many} materials; ") for text in febio_contact.notes(problem)
+    )
 
 
 def test_fibres_of_two_laws_that_febio_has_as_one_are_refused() -> None:

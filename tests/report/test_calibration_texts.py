@@ -40,10 +40,10 @@ def test_what_does_not_count_is_said() -> None:
 def test_a_fit_that_could_not_go_on_says_where_and_has_no_intervals() -> None:
     lost = Failure({"effect[0].mu": 0.019}, "diverged", "frame 40")
     best = Estimate(MU, 0.011, float("-inf"), float("inf"))
-    ended = replace(found(1.0, best), failures=(lost,), ended="a run that the fit needs has no answer")
+    ended = replace(found(1.0, best), failures=(lost,), ended="a run that the fit needs has no result")
     assert text(ended).splitlines()[1:] == [
-        "  no answer: diverged: frame 40 (effect[0].mu = 0.019)",
-        "  no fit: a run that the fit needs has no answer; the best point so far:",
+        "  no result: diverged: frame 40 (effect[0].mu = 0.019)",
+        "  no fit: a run that the fit needs has no result; the best point so far:",
         "  neo_hooke mu: 0.011 MPa",
     ]
     assert "best point" not in text(replace(ended, estimates=()))

@@ -47,20 +47,20 @@ def test_the_page_shows_ranges_with_source_and_what_was_not_varied() -> None:
 
 def test_runs_without_an_answer_are_counted_and_named() -> None:
     text = uncertainty_page.page(study(SURFACE, failures=(LOST,))).html()
-    assert "1 of 64 runs have no answer" in text
+    assert "1 of 64 runs have no result" in text
     assert "0.0123" in text
     assert "frame 40: &lt;b&gt;lost" in text
-    assert "1 without an answer" in uncertainty_page.text(study(SURFACE, failures=(LOST,)))
+    assert "1 without a result" in uncertainty_page.text(study(SURFACE, failures=(LOST,)))
     assert "frame 40" in uncertainty_page.text(study(SURFACE, failures=(LOST,)))
 
 
 def test_a_refused_band_is_said_and_not_drawn() -> None:
-    refused = replace(SURFACE, refused="12 of 64 runs have no answer")
+    refused = replace(SURFACE, refused="12 of 64 runs have no result")
     whole = study(refused)
     page = uncertainty_page.page(whole)
-    assert "no band: 12 of 64 runs have no answer" in page.html()
+    assert "no band: 12 of 64 runs have no result" in page.html()
     assert "<svg" not in page.html()
-    assert uncertainty_page.sentences(whole) == ["No band: 12 of 64 runs have no answer."]
+    assert uncertainty_page.sentences(whole) == ["No band: 12 of 64 runs have no result."]
     assert "no band: 12 of 64" in uncertainty_page.text(whole)
 
 

@@ -111,7 +111,7 @@ def test_matrices_in_parallel_share_the_force_as_springs_do(tmp_path: Path, monk
     (lost,) = fewer.failures
     assert (lost.status, lost.message) == ("refused", "its worker was lost")
     assert 0.008 <= lost.values["effect[0].mu"] <= 0.012
-    assert {band.refused.partition(":")[0] for band in fewer.bands} == {"1 of 10 runs have no answer"}
+    assert {band.refused.partition(":")[0] for band in fewer.bands} == {"1 of 10 runs have no result"}
     assert fewer.placed == ()
 
 

@@ -29,7 +29,7 @@ class CurvePoint(Record):
 
 
 class Via(Record):
-    """A point of every fibre, which moves with a ``bone``. ``at``: its place at rest, as a share of the fibre's length.
+    """A point of every fibre, which moves with a ``bone``. ``at``: its place at rest, as a fraction of the fibre's length.
 
     ``within``: the least and the greatest angle of the ``joint`` at which lines pass through the point; at other angles they omit
     it. ``curve``: its positions on the bone at some angles of the joint, the same for all fibres. Between these angles the point

@@ -1,7 +1,7 @@
 """The reference: P2 displacement, P1 pressure (Taylor-Hood) on tetrahedra, quasi-static, solved by Newton's method in FEniCSx.
 
 This module needs no FEniCSx. ``session`` runs ``worker`` in a subprocess (``mpiexec`` for more than one rank), passes the problem
-as a file, and passes frames on as the worker reports them. A worker that dies is the status *crashed*, not an exception.
+as a file, and passes frames on as the worker reports them. A worker that dies gives the status *crashed*, not an exception.
 """
 
 import logging
@@ -72,7 +72,7 @@ def solve(problem: AnyMuscle, settings: Settings, sink: Sink) -> Outcome:
 
 
 def go_on(problem: AnyMuscle, settings: Settings, sink: Sink, cut_off: CutOff) -> Outcome:
-    """Continue from the last stored frame of a run that was cut off; states are kept until the caller removes them."""
+    """Continue from the last stored frame of a run that was cut off, and delete earlier states that are not used again."""
     require(settings)
     there = kept(cut_off, problem.body)
     again = settings.reuse and not _has_steps(problem)  # whether earlier states are used again
@@ -102,7 +102,7 @@ def _solve(problem: AnyMuscle, settings: Settings, sink: Sink, kept: Kept | None
     with opened(chosen.ranks or 1) as solver:
         outcome = solver.run(Job(body, chosen, _samples(problem), kept), chosen.time_limit, pass_on)
     if outcome.status != "converged" and body.frames[0] < body.first and not passed:
-        begin = "while an overlap at rest was removed, before the first frame (which is shown as it was given)"
+        begin = "while an overlap at rest was removed, before the first frame (which shows the given rest state)"
         outcome = replace(outcome, message=f"{begin}: {outcome.message}")
     key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # the key in a scene
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
@@ -147,8 +147,8 @@ def _on_other(frame: Frame, name: str, other: str) -> dict[str, float]:
 
 
 def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
-    """True if external loads act, and the shape alone gives them as the solver integrates them. The loads are quadratic in the
-    shape, so the solver's quadrature must have degree 4 or above.
+    """True if external loads act and can be computed from the deformed shape alone, exactly as the solver integrates them. They
+    are quadratic in the shape, so the solver's quadrature must have degree 4 or above.
     """
     exact = settings.quadrature_degree is None or settings.quadrature_degree >= 4
     still = np.zeros((len(problem.mesh.tets), 10, 3))
@@ -181,7 +181,7 @@ def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: b
         note += f", a law outside its range in {scalars['outside_law']:.0f} cells"
     if is_first and (overlap := scalars.get("overlap_at_rest", 0.0)) > 0:
         stays = among(problem.effects) is not None
-        note += f", {overlap:.2g} mm of overlap with bones at rest {'that stays' if stays else 'removed'}"
+        note += f", an overlap of {overlap:.2g} mm with bones at rest {'remains' if stays else 'was removed'}"
     pulls = _loads(problem, frame) if loads else {}
     pulls |= {f"force_{name}": float(np.linalg.norm(force)) for name, force in frame.forces.items()}
     for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):
@@ -243,9 +243,8 @@ def _samples(problem: AnyMuscle) -> dict[str, tuple[Ints, Floats]]:
 def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
     """The settings, with missing values chosen for the size of the problem and the machine."""
     mesh, changes = problem.body.mesh, dict[str, int | bool]()
-    check_element(
-        settings.element, mesh.kind, mesh.degree, problem.body.effects, "element"
-    )  # not checked yet in a problem made in Python
+    # A problem made in Python has not been checked yet.
+    check_element(settings.element, mesh.kind, mesh.degree, problem.body.effects, "element")
     check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
     if isinstance(problem, MusclesProblem) or problem.body.touching:  # both need a single rank
         _check_touching(settings, "reference")
@@ -269,12 +268,11 @@ def _has_steps(problem: AnyMuscle) -> bool:
 def _check_touching(settings: Settings, place: str) -> None:
     """Raise InputError below ``place`` if the settings do not suit muscles that touch each other."""
     if (settings.ranks or 1) > 1:
-        want = "1, as several muscles, or a muscle that touches itself, are solved on one rank"
+        want = "1, as several muscles and muscles that touch themselves are solved on one rank"
         raise InputError(join(place, "ranks"), settings.ranks, want)
     if settings.linear_solver == "multigrid":
-        raise InputError(
-            join(place, "linear_solver"), '"multigrid"', "another one, as this does not support touching muscles"
-        )
+        want = "another solver, as multigrid does not support touching muscles"
+        raise InputError(join(place, "linear_solver"), '"multigrid"', want)
 
 
 def _check_ranks(settings: Settings, place: str) -> None:

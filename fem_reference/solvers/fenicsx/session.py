@@ -40,7 +40,8 @@ class Session:
         if body.touching and self.ranks > 1:
             raise InputError("ranks", self.ranks, "1, as only then parts of the surface may touch")
         if body.touching and settings.linear_solver == "multigrid":
-            raise InputError("linear_solver", '"multigrid"', "another one, as this does not support touching parts")
+            want = "another solver, as multigrid does not support touching parts"
+            raise InputError("linear_solver", '"multigrid"', want)
         return self.run(Job(body, settings), settings.time_limit, sink)
 
     def run(self, job: Job | FieldProblem, time_limit: float | None, sink: Sink) -> Outcome:

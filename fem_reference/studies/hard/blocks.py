@@ -29,7 +29,7 @@ MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible
 _LINES, _POINTS = 4, 9  # the number of measured lines of each block, and of points of each line
 # The bones of held faces are spheres far from the block; their radius and distance are in sizes of the block.
 _BALL, _AWAY = 0.01, 50.0
-_SAME = 1e-9  # the greatest rounding difference between equal motions of two holds, as a share of the block's size
+_SAME = 1e-9  # the greatest rounding difference between equal motions of two holds, relative to the block's size
 
 
 def problem(hard: Hard) -> MuscleProblem:
@@ -128,7 +128,7 @@ def _placed(block: Lattice, nodes: Ints) -> Floats:
 
 
 def _rounded(unit: Floats, share: float) -> Floats:
-    """Points ``unit`` (n, 3) of the cube from -1 to 1 moved towards the inscribed sphere by a ``share`` of the way. With y and z
+    """Points ``unit`` (n, 3) of the cube from -1 to 1 moved towards the inscribed sphere by the fraction ``share``. With y and z
     the other two coordinates, x goes to ``x (1 - y^2/2 - z^2/2 + y^2 z^2/3)^(1/2)``, which maps the cube's surface to the sphere's.
     """
     y, z = (np.roll(unit, -turn, axis=1) ** 2 for turn in (1, 2))

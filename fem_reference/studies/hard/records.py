@@ -38,9 +38,10 @@ _OWN: dict[str, dict[str, Any]] = {
 class Lattice(Record):
     """A block of ``size`` from its ``corner``, with a number of ``cells`` along each axis, each cut into six tetrahedra.
 
-    ``grading``: along each axis, ratio of last to first cell. ``jitter``: the greatest random displacement of nodes inside the
-    block and its faces, in cells, by a ``seed``. ``rounding``: the share of an ellipsoid in its shape. ``fibre``: the direction of
-    fibres and of the measured lines. ``points_apart`` [mm]: the spacing of points of contact and springs, by default as on muscles.
+    ``grading``: along each axis, ratio of last to first cell. ``jitter``: the greatest random displacement, in cell sizes, of nodes
+    inside the block and inside its faces; ``seed``: the seed of the random numbers. ``rounding``: how far the block is morphed into
+    an ellipsoid, from 0 (a block) to almost 1 (an ellipsoid). ``fibre``: the direction of fibres and of the measured
+    lines. ``points_apart`` [mm]: the spacing of points of contact and springs, by default as on muscles.
     """
 
     size: Point
@@ -59,7 +60,7 @@ class Lattice(Record):
 
 
 class Hold(Record):
-    """A ``face`` of the block, or its ``middle`` vertex, attached by springs or exactly to a bone at rest or in ``motion``."""
+    """A ``face`` of a block, or the face's ``middle`` vertex, attached by springs or exactly to a bone at rest or in ``motion``."""
 
     face: Face
     middle: bool = False
@@ -68,7 +69,7 @@ class Hold(Record):
 
 
 class OtherBody(Record):
-    """Another body, by its ``name``: a ``block`` with its ``hold``, and the effects (``effect``) in place of those of the first."""
+    """Another body, by its ``name``: a ``block``, its ``hold``, and effects (``effect``) that replace those of the first body."""
 
     name: Name
     block: Lattice
@@ -77,8 +78,8 @@ class OtherBody(Record):
 
 
 class Start(Record):
-    """The state at the first frame instead of rest: points moved at ``random`` by up to an ``amount`` of cells, or the whole body
-    collapsed to its middle ``point`` or ``plane`` across z, or turned ``inside out``.
+    """The state at the first frame instead of rest: points moved at ``random`` by up to ``amount`` cell sizes, or the whole body
+    collapsed to its middle ``point`` or onto its middle ``plane`` normal to z, or turned ``inside out``.
     """
 
     kind: Literal["random", "point", "plane", "inside out"]
@@ -86,7 +87,7 @@ class Start(Record):
 
 
 class Shipped(Record):
-    """A shipped ``case``, at its size for tests if ``quick``, with ``changes`` of its keys."""
+    """A shipped ``case``, at its quick size if ``quick``, with ``changes`` of its keys."""
 
     case: str
     quick: bool = False
@@ -99,20 +100,20 @@ class Shipped(Record):
 
 
 class StepCounts(Record):
-    """Numbers of equal load steps (``counts``) in which the reference goes to the frame ``until``; all should reach one state."""
+    """Numbers of equal load steps (``counts``) in which the reference goes to frame ``until``; all should reach the same state."""
 
     until: int
     counts: tuple[Annotated[int, Field(gt=0)], ...] = Field(default=(1, 10, 40), min_length=1)
 
 
 class Hard(Record):
-    """A hard case: a ``block`` with what acts on it and bodies ``beside`` it, or a ``shipped`` case.
+    """A hard case: a ``block`` with its effects, bones and attachments, and bodies ``beside`` it; or a ``shipped`` case.
 
     ``healthy`` describes a healthy run in words, ``bound`` in numbers, the decisive quantity first. ``only``: the solvers that the
     case is about, by default all; ``because``: the reason. ``no_solution``: the reason why no equilibrium exists, so that a run
-    should end with a status; ``contrast``: the defect that the case demonstrates, so that a run should exceed its bound.
-    ``by_effects``: the case depends on its effects and does not apply to solvers that simulate none. ``settings``: the settings
-    by solver that differ from Table 5.1. ``steps``: numbers of load steps in which the reference should reach the same end state.
+    should end with a status other than ``converged``. ``contrast``: the defect that the case demonstrates, so that a run should
+    exceed its bound. ``by_effects``: the case depends on its effects and does not apply to solvers that simulate none.
+    ``settings``: for each solver, the settings that differ from those for Table 5.1 of the report. ``steps``: see ``StepCounts``.
     """
 
     title: str

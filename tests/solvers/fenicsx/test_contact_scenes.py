@@ -109,7 +109,7 @@ def test_in_situ_an_overlap_at_rest_stays_and_is_reported(tmp_path) -> None:
     assert first.surface == pytest.approx(muscle.setup(case).surface.points, abs=1e-5)
     assert first.scalars["overlap_at_rest"] == pytest.approx(first.scalars["contact_depth"], abs=1e-5)
     assert first.scalars["overlap_at_rest"] == pytest.approx(0.46, abs=0.05)
-    assert "of overlap with bones at rest that stays" in first.note
+    assert "mm with bones at rest remains" in first.note
 
 
 def test_attached_vertices_are_exempt_from_contact(tmp_path) -> None:

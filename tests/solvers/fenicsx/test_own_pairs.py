@@ -187,7 +187,7 @@ def folded() -> MuscleProblem:
 def test_a_muscle_does_not_cross_itself_in_silence() -> None:
     # Beyond half a turn the ends themselves, which bones hold, go through each other: nothing can prevent it.
     problem, frames = folded(), []
-    with pytest.raises(InputError, match="ranks: got 2, want 1, as several muscles, or a muscle that touches itself"):
+    with pytest.raises(InputError, match="ranks: got 2, want 1, as several muscles and muscles that touch themselves"):
         fenicsx.solve(problem, fenicsx.Settings(ranks=2), frames.append)
     outcome = fenicsx.solve(problem, fenicsx.Settings(first_step=5.0, smallest_step=1.0), frames.append)
     assert [frame.number for frame in frames] == [0, 5, 10, 15]
