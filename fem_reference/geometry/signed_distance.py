@@ -59,7 +59,8 @@ class Grid:
     is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and ``FAR`` outside the grid.
     ``error`` [mm] is the largest difference found from the exact distance within one spacing of the surface, and
     ``mean_error`` [mm] the root mean square, not the mean, of the differences there. Farther away, the ridges between two close
-    parts of the surface are rounded like edges, by a third of a spacing. The gradient is that of the spline: its length is 1 within a few per cent, except on edges.
+    parts of the surface are rounded like edges, by a third of a spacing. The gradient is that of the spline: its length is 1 within
+    a few per cent, except on edges.
     """
 
     coefficients: Floats

@@ -38,7 +38,7 @@ def page(found: Uncertainty) -> Page:
 
 
 def sentences(found: Uncertainty) -> list[str]:
-    """The result in sentences: the band of the surface, the reference's error bar, the main source, the verdict on each candidate."""
+    """The result in sentences: the band of the surface, the reference's error bar, the main source, and verdicts on candidates."""
     if found.refused:
         return [f"No band: {found.refused}."]
     said = [_sentence(found, band) for band in found.bands[:1] if not band.refused]
