@@ -22,7 +22,7 @@ from fem_reference.geometry.distance import distances
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone
 
-# The pairs of corners between which the last six nodes of a tet10 lie; the first three pairs are also the pairs of a tri6.
+# The pairs of corners between which the mid-side nodes of a tet10 lie; the first three pairs are also the pairs of a tri6.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 FACING = [0, 2, 1, 5, 4, 3]  # the nodes of a tri6 whose normal is reversed
 # Springs at points are small rigid triangles of this fraction of the points' tributary areas, by which their penalty is divided.
