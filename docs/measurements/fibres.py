@@ -7,7 +7,7 @@ from typing import Any
 from measurements.tables import Measurement, kept, number, table
 
 # Ends of fibres by name, each with its distance from its attachment, as a fact of a mesh has them.
-_FAR = re.compile(r"(first|last) end of fibre (\d+), of [^:]*: ([\d.]+) mm")
+_FAR = re.compile(r"(first|last) end of fibre (\d+), [^:]*: ([\d.]+) mm")
 _ARMS = ("mean", "least", "greatest")
 _QUARTER = 50  # the frame at 0.5 rad
 

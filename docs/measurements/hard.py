@@ -108,7 +108,10 @@ def _hard_programs_left_out() -> str:
 def _stress_steps() -> str:
     rows = []
     for one in kept("stress")["measured"]["ends"]:
-        off = (one["off"].get(count, "") for count in _STEPS)
+        alone = (
+            "" if "finest" in one["off"].values() else "finest"
+        )  # the only completed run has no other to be compared with
+        off = (one["off"].get(count, alone) for count in _STEPS)
         cells = (f"{share:.0e} %" if isinstance(share, float) else share for share in off)
         rows.append((f"`{one['case']}`", one["verdict"], one["frame"], *cells))
     return table("stress", ("case", "verdict", "to frame", "1 step", "10 steps", "40 steps"), rows)

@@ -13,7 +13,7 @@ from fem_reference.problems.cubes import FREE, CubeState, loaded
 
 Material = tuple[Effect, ...]
 SQUEEZED, STRETCHED = 0.9, 1.1
-_CLEAR = 0.01  # the share by which the stiffness in a direction must differ to count as softer or stiffer
+_CLEAR = 0.01  # the fraction by which the stiffness in a direction must differ to count as softer or stiffer
 # The volume law of the case hip_flexion, after Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 VOLUME = make("incompressible_penalty", bulk="10 MPa")
 FIBRES = {"stress": 0.3, "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
@@ -77,7 +77,7 @@ def _extreme(material: Material, *, degrees: float, softest: bool) -> float:
 
 
 def confinement(material: Material) -> float:
-    """The ratio of stresses across fibres in semi-confined compression, in which the fibres lengthen, and in unconfined one."""
+    """The stress across fibres in semi-confined compression, which lengthens them, divided by that in unconfined compression."""
     return stress(material, SQUEEZED, 90, confined=True) / stress(material, SQUEEZED, 90)
 
 
@@ -88,11 +88,12 @@ def both_orders(material: Material) -> float:
 
 
 LOOCKE, WALTER, TAKAZA = "van_loocke_2006", "walter_2022", "takaza_2013"
-_READ = "The text that was read states no standard deviation: 0.05, as its values have two digits."
+_READ = "The text that was read states no standard deviation; we take 0.05, because its values have two digits."
 _TENSION_ONLY = (
     "Fibres that pull in tension only are slack in compression along them, where the matrix alone resists; across the load they "
     "are stretched and resist."
 )
+_CHOSEN = "The value is recalled; the tolerance of 0.1 is chosen by us."
 _BARE = "Fibres resist tension along them, and only the matrix resists across them."
 
 
@@ -106,13 +107,12 @@ def _squeezed(name: str, title: str, condition: str, degrees: float, axis: int) 
 def _pulled(name: str, title: str, condition: str, axis: int) -> Quantity:
     """A Poisson ratio in tension across the fibres."""
     fact, title = find(TAKAZA, "poisson_ratio", condition), f"Strip pulled across its fibres: Poisson ratio {title}"
-    return Quantity(
-        name, title, TAKAZA, poisson(STRETCHED, 90, axis), (fact,), fact.value, 0.1, "Recalled: 0.1.", _BARE
-    )
+    of = poisson(STRETCHED, 90, axis)
+    return Quantity(name, title, TAKAZA, of, (fact,), fact.value, 0.1, _CHOSEN, _BARE)
 
 
 def _ratio_by_symmetry() -> Quantity:
-    """The ratio of E along to E across: Poisson's ratios across and along have the same ratio, as the compliance is symmetric."""
+    """Young's modulus along / across fibres: the ratio of the two Poisson ratios, because the compliance is symmetric."""
     along, across = (find(LOOCKE, "poisson_ratio", words) for words in ("both strains across", "strain along them"))
     truth = along.value / across.value
     within = truth * math.hypot(0.05 / along.value, 0.05 / across.value)
@@ -125,15 +125,15 @@ def _ratio_by_symmetry() -> Quantity:
 def _confinement() -> Quantity:
     facts = find(WALTER, "axial_stress", "mode II"), find(WALTER, "axial_stress", "at 90 degrees")
     truth, sd = ratio(*facts)
-    because = "Standard deviation of the ratio of two stresses, -36.7 and -7.7 kPa; the abstract lacks their strain."
-    title = "Semi-confined compression, fibres lengthen: ratio of stress to that in unconfined compression across the fibres"
+    because = "Standard deviation of the ratio of two stresses, -36.7 and -7.7 kPa; the abstract states no strain."
+    title = "Ratio of the stress in semi-confined compression (fibres lengthen) to that in unconfined compression across them"
     return Quantity("cube_confinement", title, WALTER, confinement, facts, truth, sd, because)
 
 
 def _tension() -> Quantity:
     facts = tuple(find(TAKAZA, "axial_stress", f"{words} the fibres") for words in ("along", "across"))
     title = "Strip at a stretch of 1.1: ratio of stress along the fibres to stress across them"
-    because = "Both stresses are recalled, without deviations: the tolerance is the ratio itself."
+    because = "Both stresses are recalled and have no standard deviations, so the tolerance equals the ratio itself."
     truth = facts[0].value / facts[1].value
     of = stiffness_ratio(STRETCHED)
     return Quantity("strip_stiffness_ratio", title, TAKAZA, of, facts, truth, truth, because, _BARE)

@@ -49,7 +49,7 @@ _SHARED: dict[str, dict[str, Any]] = {
     },
     "--negative-control": {
         "action": "store_true",
-        "help": "apply the change of the case that must turn its verdict to fail",
+        "help": "apply the case's negative control, a change with which its verdict must be fail",
     },
     "--name": {
         "dest": "page_name",
@@ -64,7 +64,7 @@ _SHARED: dict[str, dict[str, Any]] = {
     "--workers": {"type": int, "default": 1, "metavar": "N", "help": "number of simultaneous runs (default: 1)"},
     "--scheduler": {
         "metavar": "ADDRESS",
-        "help": "address of a Dask scheduler (for example of dask-jobqueue) whose workers make the runs; they need access to --out",
+        "help": "address of a Dask scheduler (for example of dask-jobqueue) whose workers do the runs; they need access to --out",
     },
 }
 
@@ -92,7 +92,7 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
     kinds = whole.add_subparsers(metavar="VERB", required=True)
     for name in names():
-        # The purpose of a verb is read from its file, as importing the file takes long.
+        # The purpose of a verb is read from its file, as importing the file takes a long time.
         body = ast.parse((_FOLDER / f"{name.replace('-', '_')}.py").read_bytes()).body
         assigned = {ast.unparse(one.targets[0]): one.value for one in body if isinstance(one, ast.Assign)}
         text = ast.literal_eval(assigned["HELP"])

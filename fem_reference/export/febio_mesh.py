@@ -22,12 +22,12 @@ from fem_reference.geometry.distance import distances
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone
 
-# The pairs of corners between which the last six nodes of a tet10 lie; the first three pairs are also the pairs of a tri6.
+# The pairs of corners between which the mid-side nodes of a tet10 lie; the first three pairs are also the pairs of a tri6.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 FACING = [0, 2, 1, 5, 4, 3]  # the nodes of a tri6 whose normal is reversed
-# Springs at points are small rigid triangles of this share of the points' areas; their penalty is divided by this share.
+# Springs at points are small rigid triangles of this fraction of the points' tributary areas, by which their penalty is divided.
 SHRUNK = 0.01
-_LEAST_AREA = 1e-6  # a point with less than this share of the greatest area has no spring
+_LEAST_AREA = 1e-6  # a point with less than this fraction of the greatest area has no spring
 _CLEAR = 0.005  # barycentric distance of these triangles from the edges of their facet, so that no ray misses it
 
 
@@ -88,7 +88,7 @@ def outward(surface: Surface) -> Surface:
 
 
 def free_facets(problem: MuscleProblem) -> Ints:
-    """The facets (m, 3) of tets in contact: not attached, and with a middle that is not exempt; InputError if there are none."""
+    """The facets (m, 3) of tets in contact: not attached, with a centroid that is not exempt; InputError if there are none."""
     outer, _ = boundary(problem.mesh.tets)
     attached = np.concatenate([np.zeros((0, 3), np.int64), *problem.mesh.facets.values()])
     loose = outer[~found_in(outer, attached)]
@@ -97,7 +97,7 @@ def free_facets(problem: MuscleProblem) -> Ints:
     felt = loose[away > problem.exempt.reach]
     if len(felt) == 0:
         got = f"no facet of the tetrahedra farther than {problem.exempt.reach:.2g} mm from attached parts"
-        raise InputError("contact", got, "smaller tetrahedra (muscle.tet_size), or no effect contact")
+        raise InputError("contact", got, "smaller tetrahedra (muscle.tet_size), or a case without the effect contact")
     return felt
 
 
@@ -114,7 +114,7 @@ class SpringPoints(NamedTuple):
 
 def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringPoints:
     """The points of springs that act at points of the muscle's surface. ``tied-elastic`` subtracts the gap at rest, so a triangle
-    with the share ``SHRUNK`` of the area of a point, in the plane of its facet, acts as a spring at this point.
+    whose area is the fraction ``SHRUNK`` of a point's tributary area, in the plane of its facet, acts as a spring at this point.
     """
     skin, outer = problem.attached_skins[attached.attachment], boundary(problem.mesh.tets)[0]
     of = np.flatnonzero(skin.areas > _LEAST_AREA * skin.areas.max(initial=0.0))
@@ -122,7 +122,7 @@ def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringP
     corners = problem.mesh.points[outer[near.triangle]]
     scale = np.sqrt(SHRUNK * skin.areas[of] / corner_areas(corners))[:, None]
     least = scale / 3 + _CLEAR
-    more = np.maximum(near.barycentric - least, 0.0)  # the parts above the least share, which are scaled below
+    more = np.maximum(near.barycentric - least, 0.0)  # the parts above the least fraction, which are scaled below
     inside = least + more * (1 - 3 * least) / more.sum(axis=1, keepdims=True)
     points = np.einsum("nc,nci->ni", inside, corners)
     small = points[:, None] + scale[:, :, None] * (corners - corners.mean(axis=1, keepdims=True))
@@ -162,7 +162,7 @@ class Mesh:
             self._tied(mesh, attached, cells[springs_id(attached)])
 
     def curved(self, facets: Ints) -> Ints:
-        """Straight triangles (m, 3) of the tets with the middles of their edges, (m, 6)."""
+        """Straight triangles (m, 3) of the tets with their mid-side nodes, (m, 6)."""
         ends = np.sort(facets[:, EDGES[:3]], axis=2).reshape(-1, 2).tolist()
         middles = [self.middles[a, b] for a, b in ends]
         return np.hstack([facets, np.reshape(np.array(middles, np.int64), (-1, 3))])
@@ -209,7 +209,7 @@ class Mesh:
 
     @staticmethod
     def surface(mesh: Element, name: str, kind: str, facets: Ints) -> None:
-        """Add a surface with this ``name`` of ``facets`` (m, 3 or 6) of a ``kind``, whose nodes count from 0."""
+        """Add a surface with this ``name`` of ``facets`` (m, 3 or 6) of a ``kind``, whose nodes are numbered from 0."""
         rows(SubElement(mesh, "Surface", name=name), kind, (facets + 1).tolist())
 
     @staticmethod

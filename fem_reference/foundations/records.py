@@ -69,7 +69,7 @@ def directed(vector: tuple[float, float, float], name: str) -> tuple[float, floa
 def check_name(name: str) -> str:
     """The ``name``; ValueError if it cannot be a name."""
     if not name.isprintable() or name != name.strip() or not 0 < len(name) <= _LONGEST_NAME:
-        raise ValueError(f"a name of 1 to {_LONGEST_NAME} letters, digits and signs, without blanks at its ends")
+        raise ValueError(f"a name of 1 to {_LONGEST_NAME} letters, digits and punctuation, with no blank at either end")
     return name
 
 

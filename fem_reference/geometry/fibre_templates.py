@@ -20,7 +20,7 @@ from fem_reference.geometry.radial_basis import halton
 PLACE = "fibres.kohout_kukacka"
 _WINDOW = 7  # the number of points of a line through which smoothing fits a parabola
 _FLAT = 1e-9  # twice the area of a triangle in the unit square below which its corners count as collinear
-_SHORTEST = 0.1  # the least length of a pennate fibre, as a share of the extent of the longest fibre along the muscle
+_SHORTEST = 0.1  # the least length of a pennate fibre, as a fraction of the longest fibre's extent along the muscle
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ def contours(field: FibreField, count: int, towards: Floats | None = None) -> Co
     """``count`` sections between the attachments, with about equal volumes between them; a section with holes is left out.
 
     The first side of the middle section's square is along ``towards`` (3,) or, if this is None, along the longest axis. The squares
-    of the other sections follow from section to section by the nearest points of their rims.
+    are carried from section to section by matching nearest points of neighbouring rims.
     """
     means = field.values[field.mesh.tets].mean(axis=1)
     levels = np.quantile(means, (np.arange(count) + 0.5) / count)

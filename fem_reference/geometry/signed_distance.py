@@ -1,4 +1,4 @@
-"""Signed distance to a body with a triangulated surface: sampled once on a regular grid, and twice differentiable everywhere.
+"""Signed distance to a body with a triangulated surface: sampled once on a regular grid, in which it is twice differentiable.
 
 Tricubic B-splines interpolate between the nodes, so that gradient and curvature are continuous, as Newton's method requires.
 """
@@ -58,8 +58,9 @@ class Grid:
     ``coefficients`` (i, j, k) [mm] of the B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``. The distance
     is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and ``FAR`` outside the grid.
     ``error`` [mm] is the largest difference found from the exact distance within one spacing of the surface, and
-    ``mean_error`` [mm] the root mean square there. Farther away, the ridges between two close parts of the surface are rounded like
-    edges, by a third of a spacing. The gradient is that of the spline: its length is 1 within a few per cent, except on edges.
+    ``mean_error`` [mm] the root mean square, not the mean, of the differences there. Farther away, the ridges between two close
+    parts of the surface are rounded like edges, by a third of a spacing. The gradient is that of the spline: its length is 1 within
+    a few per cent, except on edges.
     """
 
     coefficients: Floats
@@ -212,7 +213,7 @@ def signed_distances(points: Floats, surface: Surface) -> Floats:
 
 
 def _on_nodes(surface: Surface, low: Floats, shape: tuple[int, ...], spacing: float, margin: float) -> Floats:
-    """The distance at nodes: exact within the margin and some cells more, elsewhere trilinear between every fourth node."""
+    """The distance at nodes: exact within the margin and a few cells beyond it, elsewhere trilinear between every fourth node."""
     coarse_shape = [-(-(count - 1) // _STRIDE) + 1 for count in shape]
     coarse_points = low + np.moveaxis(np.indices(coarse_shape), 0, -1).reshape(-1, 3) * (_STRIDE * spacing)
     coarse = signed_distances(coarse_points, surface).reshape(coarse_shape)

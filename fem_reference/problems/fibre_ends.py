@@ -1,4 +1,4 @@
-"""The ends of a muscle's fibres: the attachment of each end, its distance from it, and the attached area that the ends cover."""
+"""The ends of a muscle's fibres: the attachment to which each end belongs, the distance between the two, and the area covered."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,8 +21,8 @@ SIDES = ("first", "last")  # the ends of a fibre
 class FibreEnds:
     """The first and the last end of k fibres. ``by`` (k, 2): the index in ``attached`` of the attachment of each end. ``distance``
     (k, 2) [mm]: its distance from the attached area at rest; ``closest`` (k, 2, 3) [mm]: the closest point of this area.
-    ``covered`` (a,): the fraction of the area of each attachment within the mean spacing of fibres, sqrt(area / k), of an end that
-    belongs to it. If an end does not reach its attachment, the fibre continues as the tendon of the attachment, if there is one.
+    ``covered`` (a,): the fraction of each attachment's area that is nearer than the mean fibre spacing, sqrt(area / k), to an end
+    that belongs to it. If an end does not reach its attachment, the fibre continues as the attachment's tendon, if there is one.
     """
 
     attached: tuple[AttachedVertices, ...]
@@ -60,19 +60,19 @@ class FibreEnds:
 
     def named(self, fibre: int, side: int) -> str:
         """The name of an end in messages."""
-        tied = " by its tendon" if np.isfinite(self.tendons[fibre, side, 0]) else ""
-        return f"{SIDES[side]} end of fibre {fibre}, of {self.attached[self.by[fibre, side]].attachment}{tied}"
+        how = "continued to {} by a tendon" if np.isfinite(self.tendons[fibre, side, 0]) else "which belongs to {}"
+        return f"{SIDES[side]} end of fibre {fibre}, {how.format(self.attached[self.by[fibre, side]].attachment)}"
 
     @cached_property
     def facts(self) -> dict[str, float | str]:
-        """The numbers of all ends, of ends with a tendon, and of ends beside their attachment (named); the covered shares [%]."""
+        """The numbers of all ends, of ends with a tendon, and of ends beside their attachment (named); the covered areas [%]."""
         tied = np.isfinite(self.tendons[:, :, 0])
         found: dict[str, float | str] = {
             "fibre_ends": float(self.by.size),
             "fibre_ends_beside": float(self.beside.sum()),
         }
-        for one, share in zip(self.attached, self.covered, strict=True):
-            found[f"{one.attachment}_covered_percent"] = 100 * float(share)
+        for one, covered in zip(self.attached, self.covered, strict=True):
+            found[f"{one.attachment}_covered_percent"] = 100 * float(covered)
         if tied.any():
             found |= {"fibre_ends_continued": float(tied.sum()), "fibre_ends_continued_by": self._words(tied)}
         if self.beside.any():
@@ -81,8 +81,9 @@ class FibreEnds:
         return found
 
     def _words(self, mask: Bools) -> str:
-        """The ends of a ``mask`` (k, 2), each with its distance from its attachment."""
-        return "; ".join(f"{self.named(*end)}: {self.distance[*end]:.1f} mm" for end in np.argwhere(mask).tolist())
+        """The ends of a ``mask`` (k, 2), each with its distance from its attached area."""
+        named = ((self.named(*end), self.distance[*end]) for end in np.argwhere(mask).tolist())
+        return "; ".join(f"{name}: {far:.1f} mm from the attached area" for name, far in named)
 
 
 def ends_of(lines: Polylines, points: Floats | None = None) -> Floats:

@@ -38,7 +38,7 @@ def page(found: Uncertainty) -> Page:
 
 
 def sentences(found: Uncertainty) -> list[str]:
-    """The result in sentences: the band of the surface, the bar of the reference, the main source, and each candidate's verdict."""
+    """The result in sentences: the band of the surface, the reference's error bar, the main source, and verdicts on candidates."""
     if found.refused:
         return [f"No band: {found.refused}."]
     said = [_sentence(found, band) for band in found.bands[:1] if not band.refused]
@@ -47,10 +47,7 @@ def sentences(found: Uncertainty) -> list[str]:
     }
     for word, text in (
         ("inside", "Candidates whose surface error is smaller than the effect of the unknown parameters: {}."),
-        (
-            "undecided",
-            "Candidates too near to the edge of the band to decide, given the error bar of the reference: {}.",
-        ),
+        ("undecided", "Candidates too near to the band's edge for a decision, given the reference's error bar: {}."),
         ("outside", "Candidates whose surface error is larger than the effect of the unknown parameters: {}."),
         ("no answer", "Candidates without an answer in some frame: {}."),
     ):
@@ -63,13 +60,13 @@ def sentences(found: Uncertainty) -> list[str]:
 
 def _sentence(found: Uncertainty, band: Band) -> str:
     bar = band.greatest_bar
-    known = "" if math.isnan(bar) else f", where the error bar of the reference is ± {number(bar)} {band.unit}"
+    known = "" if math.isnan(bar) else f"; the error bar of the reference is ± {number(bar)} {band.unit}"
     most = max(band.total, key=lambda key: band.total[key], default="")
-    cause = {one.key: one.title for one in found.parameters}.get(most, "")
-    why = f" Its main source is {cause} ({100 * band.total[most]:.0f} % of the variance)." if cause else ""
+    name = {one.key: one.title for one in found.parameters}.get(most, "")
+    why = f" The main source of variation is {name} ({100 * band.total[most]:.0f} % of the variance)." if name else ""
     return (
-        f"In each frame, in 95 of 100 cases with other parameters in their ranges, the surface is within {number(band.width)} "
-        f"{band.unit} of this case's, rms{known}.{why}"
+        "In each frame, for 95 % of the parameter sets drawn from their ranges, the rms distance of the surface from that of this "
+        f"case is at most {number(band.width)} {band.unit}{known}.{why}"
     )
 
 

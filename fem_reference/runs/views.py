@@ -1,4 +1,4 @@
-"""Frames and runs of one of several muscles, from those of all. Names of a muscle's scalars begin with its name and a dot."""
+"""Frames and runs of a single muscle, extracted from those of several muscles. Its scalars' names begin with its name and a dot."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -25,7 +25,7 @@ _OF_ALL = (
 
 
 def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
-    """The part of a ``frame`` of several muscles for one muscle; a force on it by one of the ``others`` has the other's name."""
+    """A ``frame``'s part for one muscle; a force that one of the ``others`` exerts on it is stored under that muscle's name."""
     assert frame.surface is not None  # frames of the reference have a surface
     assert frame.fibres is not None
     forces, moments = (

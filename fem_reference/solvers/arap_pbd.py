@@ -44,8 +44,9 @@ class Projections(Record):
 class ArapPbdSettings(Record):
     """Settings of ARAP with preserved volume; rows of attached vertices are removed, and each iteration fits the rotations.
 
-    ``weights``, ``iterations`` and ``tolerance``: as in ``arap``; "tutte" is not offered, as with removed rows it gives the same
-    states as "kirchhoff". ``volume_constraint``: minimise the energy at the rest volume. ``projections``: PBD after ARAP, or none.
+    ``weights``, ``iterations`` and ``tolerance``: as in ``arap``; "tutte" is not offered, because it gives the same states as
+    "kirchhoff" once rows are removed. ``volume_constraint``: minimise the energy at the rest volume.
+    ``projections``: PBD after ARAP, or none.
     """
 
     weights: Symmetric

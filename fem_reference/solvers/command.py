@@ -47,8 +47,8 @@ class CommandSettings(Record):
 
     ``unit``: the unit of length of the frames, by default the unit in a ``candidate.toml`` next to them, otherwise mm. ``version``:
     the version of the program. ``files``: files and folders that determine the results, in addition to those named in the command.
-    ``moves``: the mesh whose points the program moves. ``time_limit``: the limit on processor time. ``directory``: the working
-    directory. ``ladder``: for some settings, a series of values from the fastest to the most accurate.
+    ``moves``: the mesh whose points the program moves. ``time_limit``: the limit on processor time. In Python also
+    ``directory``: the working directory; ``ladder``: for some settings, values from the fastest to the most accurate.
     """
 
     model_config = ConfigDict(protected_namespaces=())

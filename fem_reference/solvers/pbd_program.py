@@ -9,23 +9,23 @@ The program (github.com/cervenkam/muscle-deformation-PBD) differs from the repor
   eq. 5.18 to 5.21 drop the 6 in both)
 - folds: opened if they are sharper than at rest, never closed, and not changed if they are nearly flat or the correction would be
   small or very great (text: eq. 5.22 keeps every angle)
-- one sweep over the constraints in each step; only then collisions are found (text: many sweeps, line 15; found first,
+- one sweep over the constraints in each step; only then are collisions found (text: many sweeps, line 15; found first,
   line 13)
 - time: each step of an iteration lasts as long as all steps together should (text: section 6.1 divides it), but without forces time
   cancels
-- collisions: of vertices with voxels (text: section 6.1.1 has triangles), in the bone's frame at rest. Voxels that a
-  flood from one corner does not reach are inside. A vertex that was inside before moves by the bone's last motion, step after step,
-  even after the bone rests; a vertex that enters is moved back by steps of a voxel; of two bones the later takes precedence. Voxels
-  lie along the axes at rest, and one voxel decides where a vertex goes: if the scene is rotated, vertices of the case hip_flexion
-  differ by up to 57 mm (mean 4.5 mm; without voxels 1e-8 mm)
+- collisions: of vertices with voxels (text: section 6.1.1 has triangles), in the bone's frame at rest. Voxels that a flood fill
+  from one corner does not reach are inside. A vertex that was inside before moves by the bone's last motion, step after step, even
+  after the bone has come to rest; a vertex that enters is moved back by steps of a voxel; of two bones the later takes precedence.
+  Voxels lie along the axes at rest, and one voxel decides where a vertex goes: if the scene is rotated, vertices of the case
+  hip_flexion differ by up to 57 mm (mean 4.5 mm; without voxels 1e-8 mm)
 
 Frame number n is the state after iteration n.
 
 The recorded box is reproduced in all 300 iterations, to the last digit of its single precision. This requires the program's order
-of arithmetic, so this module shares no constraint with ``pbd``: the squeezed box is chaotic, and a difference of 1e-15 at rest, or
-between two orders, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with its own flags, among them -Ofast
-(gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by iteration 50). For the same reason
-a bone's pose is the product of its motions here, and the angle of flat pairs at rest has an error of 2e-8 rad.
+of arithmetic, so no projection of a constraint is shared with ``pbd``: the squeezed box is chaotic, and a difference of 1e-15 at
+rest, or between two orders, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with its own flags, among them
+-Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by iteration 50). For the same
+reason a bone's pose is the product of its motions here, and the angle of flat pairs at rest has an error of 2e-8 rad.
 
 Two things differ from the program: the scene defines the attached vertices (in the program, all vertices in the voxels of a bone at
 rest), and a fibre's direction follows its own points (in the program, points of several fibres).
@@ -91,11 +91,11 @@ class Voxels:
         return replace(empty, inside=~kernels.flood(border))
 
     def places(self, points: Floats) -> Floats:
-        """Points (n, 3) [mm] in voxels from the lower corner."""
+        """Points (n, 3) [mm] as positions in units of voxels from the lower corner."""
         return (points - self.lower) * (1 / self.size)
 
     def points(self, places: Floats) -> Floats:
-        """Places (n, 3) in voxels from the lower corner as points [mm]."""
+        """Positions ``places`` (n, 3) in units of voxels from the lower corner as points [mm]."""
         return places * self.size + self.lower
 
 

@@ -37,7 +37,7 @@ _AROUND, _CARRIERS = 6, 12
 class ViperSettings(Record):
     """``points``: their number in each rod. ``iterations``: sweeps over all constraints for each frame number. ``stretch``,
     ``bending``, ``volume``, ``bundle``: the stiffness of each kind of constraint in a sweep, from 0 (off) to 1. ``contact``: rods
-    stay their radius away from bones, or their distance at rest if less, and the surface is moved out of bones; by default off.
+    keep a distance of at least their radius from bones, or that at rest if less; the surface is moved out of bones. Default: off.
     """
 
     points: Annotated[int, Field(ge=4, le=1000), Trade((4, 6, 12))]

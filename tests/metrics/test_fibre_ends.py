@@ -49,7 +49,7 @@ def test_a_body_that_turns_with_one_bone_leaves_the_other(interior: bool) -> Non
     chords = np.sqrt(2 * (np.array([2.0, 5.0]) ** 2 + 50**2))
     assert_allclose(mean.values, [0, chords.sum() / 4], atol=1e-9)
     assert_allclose(worst.values, [0, chords.max()], atol=1e-9)
-    assert (mean.unit, worst.unit, worst.where[1]) == ("mm", "mm", "first end of fibre 1, of bottom")
+    assert (mean.unit, worst.unit, worst.where[1]) == ("mm", "mm", "first end of fibre 1, which belongs to bottom")
 
 
 def test_ends_that_go_with_their_bones_are_at_them_whatever_happens_between() -> None:
@@ -66,7 +66,7 @@ def test_an_end_beside_its_bone_is_off_by_what_it_lacks() -> None:
     points[5] += [0, 1.2, 1.6]
     mean, worst = ends(replace(RUN, fibre_positions=np.stack([FIBRES.points, points])))
     assert_allclose((mean.values[1], worst.values[1]), (0.5, 2), rtol=1e-9)
-    assert worst.where[1] == "last end of fibre 1, of top"
+    assert worst.where[1] == "last end of fibre 1, which belongs to top"
 
 
 def test_a_run_whose_fibres_begin_elsewhere_is_measured_from_there() -> None:

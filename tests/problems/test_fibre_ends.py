@@ -49,12 +49,12 @@ def test_distances_are_to_the_attached_area_and_not_to_its_vertices() -> None:
     assert found is not None
     assert_allclose(found.distance, [[0, 0], [1, 5]], atol=1e-12)
     assert found.by.tolist() == [[0, 1], [0, 1]]
-    assert found.named(1, 1) == "last end of fibre 1, of top"
+    assert found.named(1, 1) == "last end of fibre 1, which belongs to top"
     assert {name: one for name, one in found.facts.items() if "covered" not in name} == {
         "fibre_ends": 4.0,
         "fibre_ends_beside": 1.0,
         "fibre_end_farthest_mm": 5.0,
-        "fibre_ends_not_attached": "last end of fibre 1, of top: 5.0 mm",
+        "fibre_ends_not_attached": "last end of fibre 1, which belongs to top: 5.0 mm from the attached area",
     }
 
 
@@ -118,7 +118,8 @@ def test_an_end_beside_its_attachment_goes_on_by_the_tendon_of_it() -> None:
     assert_allclose(facts_of(given, found)["fibre_length_mean_mm"], (50 + np.sqrt(2290) + 5) / 2, rtol=1e-12)
     moved = ends_of(given) + [0, 0, 1]
     assert_allclose(found.beyond(moved, 5), [0, np.sqrt(160)], rtol=1e-12)
-    assert found.facts["fibre_ends_continued_by"] == "last end of fibre 1, of top by its tendon: 5.0 mm"
+    named = "last end of fibre 1, continued to top by a tendon: 5.0 mm from the attached area"
+    assert found.facts["fibre_ends_continued_by"] == named
     # 1 mm off the bone that rests, 9 mm off the bone that is lifted by 10, by a tendon or not.
     assert_allclose(found.off(moved, ends_of(given), 5), [[1, 9], [1, 9]], rtol=1e-12)
     lost = np.where(np.arange(3) == 0, np.nan, moved)

@@ -15,11 +15,12 @@ LOST = Failure({"effect[0].mu": 0.0123, "effect[1].c1": 0.003}, "diverged", "fra
 def test_the_answer_is_the_first_sentence_and_candidates_are_sorted_by_it() -> None:
     first, inside, undecided, outside = uncertainty_page.sentences(study(SURFACE, band()))
     assert first == (
-        "In each frame, in 95 of 100 cases with other parameters in their ranges, the surface is within 2 mm of this case's, rms, "
-        "where the error bar of the reference is ± 0.100 mm. Its main source is mooney_rivlin c1 (70 % of the variance)."
+        "In each frame, for 95 % of the parameter sets drawn from their ranges, the rms distance of the surface from that of this "
+        "case is at most 2 mm; the error bar of the reference is ± 0.100 mm. The main source of variation is mooney_rivlin c1 "
+        "(70 % of the variance)."
     )
     assert inside == "Candidates whose surface error is smaller than the effect of the unknown parameters: fast."
-    assert undecided.endswith("given the error bar of the reference: near.")
+    assert undecided.endswith("given the reference's error bar: near.")
     assert outside == "Candidates whose surface error is larger than the effect of the unknown parameters: far."
 
 
