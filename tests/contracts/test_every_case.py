@@ -122,6 +122,10 @@ def test_the_page_of_the_octave_examples(tmp_path, monkeypatch) -> None:
     assert page.count("<h2") > len(facts["cases"])
 
 
+# The muscles that keep their volume with the negative control too, as they hardly become longer.
+KEPT = {"hip_four_muscles": ("iliacus", "adductor_brevis")}
+
+
 @pytest.mark.nightly
 @pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize("name", often(MUSCLES))
@@ -132,8 +136,9 @@ def test_several_muscles_meet_their_expectations_and_fail_with_their_negative_co
         scene = casefile.read(name, changes=quickly(name) | {"frames.every": 20}, with_negative_control=control)
         found, facts = run(scene, tmp_path / word, monkeypatch, verb="compare")
         assert found == status
-        verdicts = {one["verdict"] for one in facts["muscles"].values()}
-        assert "fail" in verdicts if control else verdicts == {"pass"}  # iliacus is shorter, and keeps its volume
+        kept = KEPT.get(name, ()) if control else ()
+        wanted = {one: "pass" if one in kept else word for one in facts["muscles"]}
+        assert {one: result["verdict"] for one, result in facts["muscles"].items()} == wanted
         assert {one["solver"] for one in facts["penetration"]} == {"reference", *(one.name for one in scene.candidate)}
 
 
