@@ -108,9 +108,8 @@ def _hard_programs_left_out() -> str:
 def _stress_steps() -> str:
     rows = []
     for one in kept("stress")["measured"]["ends"]:
-        alone = (
-            "" if "finest" in one["off"].values() else "finest"
-        )  # the only completed run has no other to be compared with
+        # The only completed run has no other to be compared with.
+        alone = "" if "finest" in one["off"].values() else "finest"
         off = (one["off"].get(count, alone) for count in _STEPS)
         cells = (f"{share:.0e} %" if isinstance(share, float) else share for share in off)
         rows.append((f"`{one['case']}`", one["verdict"], one["frame"], *cells))
