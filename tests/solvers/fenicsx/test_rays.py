@@ -59,14 +59,22 @@ def test_forces_balance_and_their_tangent_is_exact(element, rough) -> None:
     assert sums == pytest.approx(np.zeros(6), abs=1e-15)
 
 
-def greatest_jump(contact: TouchingForces, upper: np.ndarray, count: int, path: tuple[np.ndarray, ...]) -> float:
-    """The greatest change of the force on the points of a plate in ``count`` steps along a straight path."""
+def upper_alone(contact: TouchingForces) -> None:
+    """Let only the points of the upper part search from now on, of whose force is asked: half of the time."""
+    contact.passes, contact.rubbing, contact.now = contact.passes[1:], contact.rubbing[1:], contact.now[1:]
+    contact.settled = (contact.settled[0], contact.settled[1][1:], *contact.settled[2:])
+
+
+def greatest_jumps(contact: TouchingForces, upper: np.ndarray, path: tuple[np.ndarray, ...]) -> tuple[float, float]:
+    """The greatest change of the force on the points of a plate in 60 steps along a straight path, and in 600, of which those are
+    each the tenth.
+    """
     forces = []
-    for share in np.linspace(0, 1, count + 1):
+    for share in np.linspace(0, 1, 601):
         contact.unknowns.x.array[upper] = path[0] + share * (path[1] - path[0])
         contact.look()
-        forces.append(contact.now[1][1].force.sum(axis=0))
-    return float(np.abs(np.diff(forces, axis=0)).max())
+        forces.append(contact.now[0][1].force.sum(axis=0))
+    return tuple(float(np.abs(np.diff(forces[::every], axis=0)).max()) for every in (10, 1))
 
 
 @pytest.mark.slow
@@ -77,17 +85,18 @@ def test_forces_are_continuous_across_a_ridge_and_a_sharp_edge(element, slope) -
     change by a tenth. To the nearest place, they jump.
     """
     contact, upper = over_a_block(element)
+    upper_alone(contact)
     measured(contact)
-    one = contact.passes[1]
+    (one,) = contact.passes
     contact.unknowns.x.array[one.other.dofs[..., 2]] = -slope * np.maximum(one.other.rest[..., 0] - 0.5, 0)
     for ends in ((0.3, 0.7), (0.2, -0.3)):
         path = tuple(np.array([x - 0.5, 0.0, 0.48 - 1.5]) for x in ends)
-        few, many = (greatest_jump(contact, upper, count, path) for count in (60, 600))
+        few, many = greatest_jumps(contact, upper, path)
         assert few > 1e-6
         assert many < 0.2 * few
     path = tuple(np.array([x - 0.5, 0.0, 0.48 - 1.5]) for x in (0.2, -0.3))
     measured(contact, Pass)
-    few, many = (greatest_jump(contact, upper, count, path) for count in (60, 600))
+    few, many = greatest_jumps(contact, upper, path)
     assert many > 0.5 * few
 
 
