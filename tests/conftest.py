@@ -18,6 +18,7 @@ SINGLE = {"test_every_case.py": "]", "test_every_entry.py": "_"}
 
 def pytest_configure() -> None:
     """Each of the processes that share the tests keeps to a core of its own, and so do the solvers that it starts."""
+    gc.disable()  # to the end of the collection, of which hardly anything can be freed
     worker = os.environ.get("PYTEST_XDIST_WORKER")  # gw0, gw1, ...
     if worker is not None:
         cores = sorted(os.sched_getaffinity(0))
@@ -35,6 +36,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_collection_finish() -> None:
     """What was imported and collected stays to the end: nothing of it is looked at again for what can be freed."""
     gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl(optionalhook=True)

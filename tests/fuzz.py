@@ -4,6 +4,7 @@
 """
 
 import argparse
+import importlib
 import os
 import resource
 import select
@@ -33,6 +34,8 @@ from fem_reference.solvers import fenicsx
 # [bytes].
 SECONDS, CALL, PATIENCE, MEMORY = 10, 60, 900, 2 * 2**30
 KINDS = [*hostile.KINDS, *calls.KINDS]
+# What most processes of an input would otherwise import each for itself, which takes longer than what they do.
+SHARED = ("numba", "pint", "scipy.interpolate", "scipy.stats")
 # Inputs are drawn, and neither timed, kept nor made smaller, by Hypothesis.
 UNTIMED = settings(deadline=None, database=None, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
 
@@ -206,6 +209,9 @@ def every(names: Sequence[str], options: argparse.Namespace) -> Iterator[tuple[s
     """What came of each kind: of files, which are read in processes that fork, before calls."""
     counts = {name: -(-options.inputs // shares(name, names)) for name in names}
     of_calls = [name for name in names if name in calls.KINDS]
+    if len(of_calls) < len(names):
+        for module in SHARED:
+            importlib.import_module(module)
     for name in names:
         if name in hostile.KINDS:
             yield name, fuzz(name, counts[name], options.seed, options.kept)

@@ -30,6 +30,13 @@ COMMANDS = {
     "page": ["compare", "--candidate", "pbd"],
     "study": ["study", "--solver", "arap"],
 }
+# What a command does that draws no pictures.
+UNDRAWN = """
+from fem_reference.cli import entry
+from fem_reference.report import gallery
+gallery.program = lambda _job, _folder: ["/nowhere/python"]
+entry()
+"""
 # What is no answer: it takes another time each time.
 _TIMES = ("seconds", "cost", "machine", "peak_memory", "processor", "finished", "time", "folder", "unknowns_per")
 
@@ -94,10 +101,12 @@ def _apart(one: Any, other: Any, place: str = "") -> list[str]:
 
 
 class Subject:
-    """A command on the small scene, and how it ends when nothing befalls it."""
+    """A command on the small scene, and how it ends when nothing befalls it; of its pages only the names are compared, so that they
+    may be without pictures (``drawn``).
+    """
 
-    def __init__(self, name: str, place: Path, every: int) -> None:
-        self.words, self.every = COMMANDS[name], every
+    def __init__(self, name: str, place: Path, every: int, *, drawn: bool = True) -> None:
+        self.words, self.every, self.drawn = COMMANDS[name], every, drawn
         self.scene = small.write(place / "bar")
         # The same each time: keys of runs may name files that lie there.
         self.out, self.scratch = place / "out", place / "tmp"
@@ -112,7 +121,7 @@ class Subject:
         verb, *rest = self.words
         words = [verb, str(self.scene), *rest, "--out", str(self.out), "--set", f"frames.every={self.every}"]
         return subprocess.Popen(
-            command("-m", "fem_reference", *words),
+            command(*(("-m", "fem_reference") if self.drawn else ("-c", UNDRAWN)), *words),
             env=environment(OMP_NUM_THREADS="1", TMPDIR=str(self.scratch)),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hard_cases import CASES
 
 from fem_reference.assessment import health
-from fem_reference.studies.hard import blocks, records
-
-CASES = {hard.name: hard for hard in records.read_all()}
+from fem_reference.studies.hard import blocks
 
 
 def test_quantities_are_zero_at_rest_and_see_what_they_are_for() -> None:

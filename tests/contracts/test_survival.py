@@ -103,7 +103,7 @@ def test_a_run_that_was_cut_off_goes_on(kind: str, tmp_path: Path, monkeypatch: 
 @pytest.mark.slow
 def test_a_command_that_is_killed_ends_as_if_it_had_not_been(tmp_path: Path) -> None:
     """``tests/kills.py`` does so more often, with error bars, pages and studies too."""
-    subject = kills.Subject("run", tmp_path, 5)
+    subject = kills.Subject("run", tmp_path, 5, drawn=False)
     assert subject.kill(0.1, 3)
     assert subject.compare(subject.finish()) == []
 
@@ -111,6 +111,8 @@ def test_a_command_that_is_killed_ends_as_if_it_had_not_been(tmp_path: Path) -> 
 # What a process does that may write no file beyond so many bytes: as on a disk that is full.
 _SMALL_DISK = """
 import resource, sys
+from fem_reference.report import gallery
+gallery.program = lambda _job, _folder: ["/nowhere/python"]
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)
 from fem_reference.cli import main
 sys.exit(main(sys.argv[2:]))

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
+from hard_cases import CASES
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import tet_volumes
 from fem_reference.studies.hard import blocks, records, running
-
-CASES = {hard.name: hard for hard in records.read_all()}
 
 
 @pytest.mark.slow

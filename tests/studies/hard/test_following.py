@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import stand_ins
+from hard_cases import CASES
 
 from fem_reference.assessment import health
 from fem_reference.foundations.errors import InputError
@@ -13,8 +14,6 @@ from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx, pbd
 from fem_reference.studies.hard import blocks, following, records
 from fem_reference.studies.hard.following import StalledError, follow
-
-CASES = {hard.name: hard for hard in records.read_all()}
 
 
 @pytest.mark.slow

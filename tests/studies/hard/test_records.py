@@ -1,12 +1,11 @@
 """Files of hard cases: every folder is whole, and a mistake is named with its key; and the settings of their solvers."""
 
 import pytest
+from hard_cases import CASES
 
 from fem_reference import solvers
 from fem_reference.foundations.errors import InputError
 from fem_reference.studies.hard import records
-
-CASES = {hard.name: hard for hard in records.read_all()}
 
 
 def test_every_folder_is_there_and_every_case_has_a_name_of_its_own() -> None:

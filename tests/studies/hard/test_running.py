@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import stand_ins
+from hard_cases import CASES
 
 from fem_reference.assessment.stress import Cell
 from fem_reference.geometry import skins
@@ -15,7 +16,6 @@ from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx, pbd
 from fem_reference.studies.hard import following, records, running
 
-CASES = {hard.name: hard for hard in records.read_all()}
 FAST = [name for name in records.choices() if name not in ("fenicsx", "scikit_fem")]
 
 
