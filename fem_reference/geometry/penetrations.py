@@ -215,7 +215,7 @@ def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
     """Mask (k,) of the points (k, 3) of a ``body`` inside the surface; all False if their mean is outside the surface's box."""
     middle, low, high = body.sum(axis=0) / max(1, len(body)), surface.points.min(axis=0), surface.points.max(axis=0)
     boxed = len(body) > 0 and bool(((middle > low) & (middle < high)).all())
-    return inside(surface, body) if boxed else np.zeros(len(body), bool)
+    return _inside(surface, body) if boxed else np.zeros(len(body), bool)
 
 
 def _touches(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance) -> bool:
