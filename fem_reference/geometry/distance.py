@@ -18,15 +18,19 @@ _WITHIN = 16
 
 
 class Distances(NamedTuple):
-    """For each of n points: ``distance`` (n,) [mm] to the surface and the ``triangle`` (n,) that is closest.
-
-    ``closest`` (n, 3) [mm] is the closest point of that triangle, ``barycentric`` (n, 3) its coordinates there.
+    """For each of n points: ``distance`` (n,) [mm] to the ``surface`` and the ``triangle`` (n,) that is closest; ``closest`` (n, 3)
+    [mm] is the closest point of that triangle.
     """
 
     distance: Floats
     triangle: Ints
     closest: Floats
-    barycentric: Floats
+    surface: Surface
+
+    @property
+    def barycentric(self) -> Floats:
+        """The coordinates (n, 3) of the closest points in their triangles."""
+        return _barycentric(self.closest, self.surface.points[self.surface.triangles[self.triangle]])
 
 
 def distances(points: Floats, surface: Surface) -> Distances:
@@ -36,14 +40,13 @@ def distances(points: Floats, surface: Surface) -> Distances:
         if not np.isfinite(given).all():  # libigl would return triangles that do not exist
             raise ValueError(f"distances: the {what} are not all finite")
     if len(points) == 0:
-        return Distances(np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
+        return Distances(np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3)), surface)
     vertices, triangles = surface.points, surface.triangles
     tree = _tree(vertices.tobytes(), triangles.tobytes())
     squares, triangle, closest = tree.squared_distance(vertices, triangles, points)
     lost = ~np.isfinite(squares)  # libigl's results are arbitrary where squares overflow
     triangle[lost], closest[lost] = 0, vertices[triangles[0, 0]]
-    inner = _barycentric(closest, surface.points[surface.triangles[triangle]])
-    return Distances(np.sqrt(np.maximum(squares, 0)), np.asarray(triangle, np.int64), closest, inner)
+    return Distances(np.sqrt(np.maximum(squares, 0)), np.asarray(triangle, np.int64), closest, surface)
 
 
 # A surface is often queried for a few points at a time, and building its search tree takes as long as thousands of queries.

@@ -58,9 +58,9 @@ class Locator:
 
     def _first_of_ties(self, skin: Distances) -> Ints:
         """The closest boundary triangles (n,); at an edge or corner the first of them, so that rounding does not decide."""
-        chosen = np.array(skin.triangle)
-        for i in np.flatnonzero((skin.barycentric < _TIE).any(axis=1)):
-            shared = self.faces[chosen[i]][skin.barycentric[i] >= _TIE]
+        chosen, inner = np.array(skin.triangle), skin.barycentric
+        for i in np.flatnonzero((inner < _TIE).any(axis=1)):
+            shared = self.faces[chosen[i]][inner[i] >= _TIE]
             chosen[i] = np.argmax(np.isin(self.faces, shared).sum(axis=1) == len(shared))
         return chosen
 

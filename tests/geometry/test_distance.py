@@ -55,7 +55,7 @@ def test_a_triangle_without_area_still_has_weights() -> None:
 
 def test_no_points_have_no_distances() -> None:
     found = distances(np.zeros((0, 3)), CUBE)
-    assert [len(part) for part in found] == [0, 0, 0, 0]
+    assert [len(part) for part in (found.distance, found.triangle, found.closest, found.barycentric)] == [0, 0, 0, 0]
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
