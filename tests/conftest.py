@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import h5py  # noqa: F401 - before DOLFINx, whose HDF5 it would take for its own
+import numpy as np
 import pytest
 
 collect_ignore = ["foreign_solver.py", "run_notebook.py"]  # programs: they run where they are imported
@@ -92,6 +93,28 @@ def _each_mesh_is_made_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(muscle, "tetrahedralise", tetrahedralise)
         patch.setattr(muscle, "kept_meshes", lambda: None)  # what a test changes of the mesher is kept nowhere
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _distances_to_a_bone_are_read_once() -> Iterator[None]:
+    """Those of the last few bones stay in memory: what is stored of them is tested where it is stored, and elsewhere the same."""
+    from fem_reference.foundations.mesh import fingerprint
+    from fem_reference.problems import setup
+
+    read: dict[tuple[str, Path], Any] = {}
+    stored = setup.cached
+
+    def cached(surface: Any, error: float, margin: float, rounding: float, folder: Path) -> Any:
+        key = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding])), folder
+        if key not in read:
+            if len(read) == 24:
+                read.clear()
+            read[key] = stored(surface, error, margin, rounding, folder)
+        return read[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(setup, "cached", cached)
         yield
 
 

@@ -66,11 +66,13 @@ def test_what_febio_has_of_each_effect_is_what_is_exported() -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed")
-def test_the_recipe_of_an_ordinary_muscle_can_be_solved(tmp_path: Path) -> None:
-    """Its last frames on unrefined tetrahedra, with its volume kept."""
+@pytest.mark.parametrize("size", ["15 mm", pytest.param("10 mm", marks=pytest.mark.nightly)])
+def test_the_recipe_of_an_ordinary_muscle_can_be_solved(size: str, tmp_path: Path) -> None:
+    """Its last frames on unrefined tetrahedra, at night of its own size, with its volume kept."""
     (text,) = (text for name, text in pages.snippets("toml") if name == "docs/ordinary_muscle.md")
     table = tomllib.loads(text)
-    table["muscle"]["refinements"], table["frames"]["every"] = 0, 50
+    assert table["muscle"]["tet_size"] == "10 mm"
+    table["muscle"]["refinements"], table["muscle"]["tet_size"], table["frames"]["every"] = 0, size, 50
     case = fr.make_case(table, name="ordinary_muscle")
     run = fr.solve(case, store=tmp_path)
     assert run.outcome.status == "converged"

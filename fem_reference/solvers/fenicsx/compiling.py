@@ -70,7 +70,7 @@ def _complete[R](search: Callable[..., R]) -> Callable[..., R]:
 generator.compile_forms = _alone(generator.compile_forms)
 generator.compile_expressions = _alone(generator.compile_expressions)
 generator.get_cached_module = _complete(generator.get_cached_module)
-# An element makes its cell, with all cells of its boundary, whenever it is asked for it: a fifth of the time to set up a small body.
+# An element makes its cell, with all cells of its boundary, whenever it is asked: a fifth of the time to set up a small body.
 ufl.cell.Cell = cache(ufl.cell.Cell)
 
 
