@@ -18,9 +18,7 @@ _WITHIN = 16
 
 
 class Distances(NamedTuple):
-    """For each of n points: ``distance`` (n,) [mm] to the ``surface`` and the ``triangle`` (n,) that is closest; ``closest`` (n, 3)
-    [mm] is the closest point of that triangle.
-    """
+    """Distances of n points to a ``surface``: ``distance`` (n,) [mm], closest ``triangle`` (n,), ``closest`` point (n, 3) [mm]."""
 
     distance: Floats
     triangle: Ints

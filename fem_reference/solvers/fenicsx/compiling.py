@@ -45,9 +45,8 @@ def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
 
 
 def _complete[R](search: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's search for a compiled form, after incomplete files of it are removed. As this process holds the lock, no other process
-    is writing these files: an interrupted or killed process left them, and FFCx would wait for their completion. What was found is
-    not loaded again.
+    """FFCx's search for a compiled form, once for each, after its incomplete files are removed. As this process holds the lock, no
+    other process is writing these files: an interrupted or killed process left them, and FFCx would wait for their completion.
     """
     loaded: dict[str, R] = {}
 

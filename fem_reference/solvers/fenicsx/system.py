@@ -64,8 +64,7 @@ class System:
         self.structure = structure
         self.tangent = Tangent(np.zeros(len(rows) + 1), self.cells.places(structure, self.fixed), unit)
         self.matrix.setPreallocationCOO(names[rows], names[structure.columns])
-        diagonal = np.flatnonzero(structure.columns == rows)
-        own = np.flatnonzero(self.fixed[: self.owned])
+        diagonal, own = np.flatnonzero(structure.columns == rows), np.flatnonzero(self.fixed[: self.owned])
         self.prescribed_diagonal = diagonal[own]  # every row has one, in the order of the rows
         for terms in self.surface:
             terms.find_places(self._keys())
@@ -141,13 +140,11 @@ class System:
         if space.num_sub_spaces == 1:
             return
         self.linearise()
-        names = np.unique(space.sub(1).dofmap.list[: self.cells.count])
         pressures = np.zeros(self.size, bool)
-        pressures[names] = True
+        pressures[np.unique(space.sub(1).dofmap.list[: self.cells.count])] = True
         rows = np.repeat(np.arange(self.size), np.diff(self.structure.starts))
         squares = self.tangent.entries[:-1] ** 2
-        moved = ~pressures[rows] & ~self.fixed[rows]
-        of_pressures = pressures[self.structure.columns]
+        moved, of_pressures = ~pressures[rows] & ~self.fixed[rows], pressures[self.structure.columns]
         sums = [float(squares[moved & (of_pressures == which)].sum()) for which in (False, True)]
         stiff, coupling = self.unknowns.function_space.mesh.comm.allreduce(np.array(sums), MPI.SUM)
         if coupling > 0:
@@ -186,8 +183,7 @@ class SurfaceSums:
     def __init__(self, terms: Any, unknowns: fem.Function, fixed: NDArray[np.bool_]) -> None:
         step = ufl.TrialFunction(unknowns.function_space)
         self.residual, self.slope = compiling.form(terms), compiling.form(ufl.derivative(terms, unknowns, step))
-        self.matrix = fem.create_matrix(self.slope)
-        self.fixed = fixed
+        self.matrix, self.fixed = fem.create_matrix(self.slope), fixed
 
     def find_places(self, keys: Ints) -> None:
         """Find the places of the tangent among entries with the sorted ``keys`` (e,), each ``row * size + column``."""
