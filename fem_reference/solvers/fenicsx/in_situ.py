@@ -15,12 +15,12 @@ from fem_reference.solvers.fenicsx.system import System
 
 _MOST = 40  # linear problems
 _TOLERANCE = 1e-12  # the relative tolerance of a linear problem
-_SHARE = 1e-2  # the remaining residual, as a share of the tolerance of Newton's method
+_SHARE = 1e-2  # the remaining residual, as a fraction of the tolerance of Newton's method
 
 
 def balance(form: Form, system: System, linear: LinearSolver, residual: float) -> None:
-    """Find the stress at rest of a ``form``, if it has one, up to a small share of the tolerated ``residual`` of Newton's method.
-    ArithmeticError if there is none.
+    """Find the stress at rest of a ``form`` in situ, up to a small fraction of the tolerance ``residual`` of Newton's method.
+    ArithmeticError if no stress at rest is found.
     """
     if form.rest is None:
         return
