@@ -29,7 +29,7 @@ def balance(form: Form, system: System, linear: LinearSolver, residual: float) -
     for _ in range(_MOST):
         if system.residual() <= _SHARE * residual:
             if contact is not None:
-                contact.look()  # points that are pressed at rest have a longer reach
+                contact.look()  # the bones' reach depends on the overlaps, which have changed
             return
         forces = system.b.copy()
         with form.isotropic():
