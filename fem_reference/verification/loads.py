@@ -26,7 +26,7 @@ QUARTER = Turn((0.0, 1.0, 0.0), np.pi / 2, knots=((1.0, 0.0), (2.0, 1.0)))
 
 
 def weight(density: float, times: float = 1.0) -> Effect:
-    """Gravity along -z, ``times`` that of the earth, on a material of ``density`` [tonne/mm3]."""
+    """Gravity along -z, ``times`` the earth's gravity, on a material of ``density`` [tonne/mm3]."""
     pull = f"0, 0, {-FREE_FALL * times} mm/s^2"
     return make("gravity", density=f"{density} tonne/mm^3", acceleration=pull, ramp=parts.ramp())
 
@@ -105,7 +105,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=MUSCLE * FREE_FALL * float(np.prod(LARGE)),
         within=2e-9,
         because="The forces of a discrete equilibrium sum to zero on every mesh, up to the residual: over 150 free nodes its norm "
-        "is 1e-10 N, so that its sum may be sqrt(150) times as large.",
+        "is 1e-10 N, so its sum may be sqrt(150) times as large.",
         kind="closed form",
         source="Density times acceleration times volume.",
     ),
