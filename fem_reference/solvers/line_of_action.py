@@ -1,8 +1,8 @@
 """Lines of action: each fibre of the scene as one line between its bones, straight, through via-points or around an obstacle.
 
-Report 5.1 to 5.3. The ends of a line are the ends of the fibre, each fixed to the bone whose attachment is nearest at rest. Between
-two fixed points the line is as short as possible. A line has a length, with ``hill`` also a force, and no surface: only length and
-force are judged. A line goes around an obstacle on the shorter side, and so changes sides when its ends pass opposite points.
+Report sections 5.1 to 5.3. The ends of a line are the ends of the fibre, each fixed to the bone with the nearest attachment at
+rest. Between fixed points a line is as short as possible. It has a length, with ``hill`` also a force, and no surface: only length
+and force are judged. A line takes the shorter side of an obstacle, and so changes sides when its ends pass opposite points.
 """
 
 from itertools import pairwise

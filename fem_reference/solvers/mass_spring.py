@@ -29,7 +29,7 @@ from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advanc
 
 # The ratio of the default time step to the largest stable time step.
 SHARE_OF_STABLE = 0.9
-# A run with more steps per frame number than this is refused: with 3,000 tetrahedra a frame number would take over two seconds.
+# A run with more steps per frame number than this is refused: with 3,000 tetrahedra each frame number would take over two seconds.
 _MOST_STEPS = 100_000
 # Time steps in one call of compiled code; the user can interrupt a run only between calls.
 _AT_ONCE = 200

@@ -167,7 +167,7 @@ def to_segment(p: Vector, start: Vector, end: Vector) -> float:
 
 @compiled
 def nearest_segments(points: Floats, starts: Floats, ends: Floats, within: float) -> Ints:
-    """The segment (n,) nearest to each of ``points`` (n, 3); of segments ``within`` [mm] of the smallest distance, the first.
+    """The segment (n,) nearest to each of ``points`` (n, 3): the first of those ``within`` [mm] of the minimum distance.
 
     Segments go from ``starts`` (k, 3) to ``ends`` (k, 3) [mm].
     """
@@ -183,7 +183,7 @@ def nearest_segments(points: Floats, starts: Floats, ends: Floats, within: float
 
 @compiled
 def project_volume(points: Floats, inverse_masses: Floats, triangles: Ints, rest: float, stiffness: float) -> None:
-    """Move every point along the volume's gradient, towards ``rest`` [mm3], six times a volume."""
+    """Move every point along the gradient of six times the volume, towards its value ``rest`` [mm3]."""
     value, gradient = volume(points, triangles)
     weight = 0.0
     for i in range(len(points)):

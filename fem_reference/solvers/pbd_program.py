@@ -137,9 +137,9 @@ def half_edges_of(triangles: Ints) -> Ints:
 
 
 def hinges_of(points: Floats, triangles: Ints) -> tuple[Ints, Floats]:
-    """Each edge of a closed surface once, in the order of the later of its triangles, and the angle [rad] of the two triangles.
+    """The hinges (e, 4) of a closed surface and their angles (e,) [rad], one per edge, in the order of its later triangle.
 
-    (e, 4): its ends, the vertices opposite it in the earlier and in the later triangle; (e,).
+    A hinge: both ends of the edge, then the vertices opposite the edge in the earlier and in the later of its triangles.
     """
     opposite, starts, ends = (np.roll(triangles, -corner, axis=1).ravel() for corner in range(3))
     sides = np.lexsort((np.maximum(starts, ends), np.minimum(starts, ends))).reshape(-1, 2)

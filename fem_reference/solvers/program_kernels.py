@@ -2,7 +2,7 @@
 
 The code follows the program's source. As the result is chaotic, the last digit matters: each sum has the order that gcc 12 produces
 with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than SSE2), as
-found in the machine code. Do not simplify the sums. Arrays should be writable and C-contiguous: others compile the loops again.
+found in the machine code. Do not simplify the sums. Arrays should be writable and C-contiguous; the loops compile anew for others.
 """
 
 import math
@@ -201,7 +201,7 @@ def mark(border: Bools, points: Floats, places: Floats, triangles: Ints) -> None
 
 @compiled
 def flood(border: Bools) -> Bools:
-    """The voxels (k, k, k) reached by a flood from (0, 0, 0), through faces, not into the ``border`` or back to an index of 0."""
+    """The voxels (k, k, k) reached by a flood from (0, 0, 0) through faces, without the ``border`` or a return to an index of 0."""
     outside = np.zeros(border.shape, np.bool_)
     found = np.zeros((border.size, 3), np.int64)
     outside[0, 0, 0] = not border[0, 0, 0]

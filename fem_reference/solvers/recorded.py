@@ -126,7 +126,7 @@ def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
 
 
 def checked_frames(setup: Setup, folder: Path, unit: float) -> Iterator[Frame]:
-    """The requested frames, one after the other, of the sequence in a ``folder``, whose unit of length is ``unit`` [mm];
+    """The requested frames, one after the other, of the sequence in a ``folder``, with lengths in units of ``unit`` [mm];
     InputError at the first frame that is missing or not of this surface.
 
     The times in an index file are multiples of ``setup.interval`` [s], or frame numbers if the interval is None.

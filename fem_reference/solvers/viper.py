@@ -1,4 +1,4 @@
-"""VIPER: a muscle as a bundle of rods with volume, bends and twist, by position based dynamics.
+"""VIPER: a muscle as a bundle of rods that have volume, bend and twist, by position based dynamics.
 
 Angles et al. (2019), doi:10.1145/3340260: a rod has points, each with a radius, and segments, each with a frame. It resists stretch
 and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep their volume: the radii shrink where the rod is

@@ -75,7 +75,7 @@ def project_bend(turns: Floats, stiffness: float) -> None:
 
 
 def volumes(points: Floats, radii: Floats) -> Floats:
-    """Volumes (k, p - 1) [mm3] of segments as cones, ``pi / 3 l (r_a^2 + r_a r_b + r_b^2)``."""
+    """Volumes (k, p - 1) [mm3] of segments as truncated cones, ``pi / 3 l (r_a^2 + r_a r_b + r_b^2)``."""
     a, b = radii[:, :-1], radii[:, 1:]
     return np.asarray(np.pi / 3 * np.linalg.norm(np.diff(points, axis=1), axis=2) * (a * a + a * b + b * b))
 

@@ -1,4 +1,4 @@
-"""Extended position based dynamics of the muscle surface: constraints with compliances in physical units, in real time.
+"""Extended position based dynamics of the muscle surface: constraints with compliances, and time, in physical units.
 
 Macklin, Mueller and Chentanez 2016, "XPBD: position-based simulation of compliant constrained dynamics",
 DOI 10.1145/2994258.2994272; report section 5.5.3 mentions it. The surface is a membrane with mass around an interior that
@@ -93,7 +93,7 @@ class XpbdConstraints:
         # Compiled functions need writable arrays.
         points, triangles = np.array(surface.points), np.array(surface.triangles)
         hinges, six_volumes = hinges_of(triangles), volume(points, triangles)[0]
-        areas = sum(triangle_areas(points, hinges[:, corners]) for corners in ([0, 1, 2], [0, 1, 3]))  # of two
+        areas = sum(triangle_areas(points, hinges[:, corners]) for corners in ([0, 1, 2], [0, 1, 3]))  # of both
         slender = distances(points, hinges) ** 2 / areas
         stiffnesses = settings.stretch, settings.bending, settings.volume
         stretched, bent, filled = (slice(None if stiffness else 0) for stiffness in stiffnesses)

@@ -101,7 +101,7 @@ def tip_entry(
 ) -> Entry:
     """The tip of a ``panel`` with an ``element``; ``stiff``: the tolerance, and the excess stiffness in words."""
     words, counts = CELLS[element]
-    by, order = ("of linear cells", 2) if "1" in element[:2] else ("limited by the singular clamped corners", 1)
+    by, order = ("with linear cells", 2) if "1" in element[:2] else ("limited by the singular clamped corners", 1)
     stated = {"refinement": Refinement(counts, HEIGHT, order)} | wrong | more
     return MEMBRANE(
         name=f"cook_{name}",

@@ -1,4 +1,4 @@
-"""Weights, pressures and dead forces on blocks."""
+"""Weights, pressures and dead loads on blocks."""
 
 from dataclasses import replace
 from functools import partial

@@ -111,7 +111,7 @@ def touching_denials(lab: Lab, farther: float = 0.0) -> Finding:
 
 
 def unbalanced(lab: Lab, lost: float = 0.0) -> Finding:
-    """The number of balance checks that the pressed blocks fail if the fraction ``lost`` of the force on them is missing."""
+    """The number of balance checks that the pressed blocks fail if the fraction ``lost`` of the driving force is missing."""
     body = pressed_blocks(BLOCK_STIFFNESS)
     run = lab.solve(body, "P2/P1", first_step=0.5)
     forces = run.last.forces | {"high_z1": (1 - lost) * run.last.forces["high_z1"]}

@@ -57,7 +57,7 @@ def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> O
 
 
 def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
-    """Trouble with a bone that turns too far between two samples of its pose, or out and back; None without trouble."""
+    """Trouble with a bone that moves too far, or out and back, between two samples of its pose; None without trouble."""
     if all(bone.motion is None for bone in setup.bones):
         return None
     points, count = setup.surface.points, (setup.frames[-1] - setup.frames[0]) * per_frame

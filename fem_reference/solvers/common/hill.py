@@ -62,7 +62,7 @@ class Hill(Record):
         return tendon((path - along) / self.slack_length - 1)
 
     def imbalance(self, path: float, fibre: float, activation: float) -> float:
-        """The force [F0] along the tendon of fibres at zero velocity, minus the force of the tendon."""
+        """The component [F0] along the tendon of the fibres' force at zero velocity, minus the force of the tendon."""
         return (activation * active(fibre) + passive(fibre)) * self.cosine(fibre) - self.tendon_force(path, fibre)
 
     def static(self, path: float, activation: float) -> tuple[float, float]:

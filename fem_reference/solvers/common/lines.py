@@ -153,7 +153,7 @@ def _layout(sizes: tuple[int, ...], places: tuple[float, ...]) -> tuple[Ints, Fl
 
 
 def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
-    """The part of each point of a line and the fraction of the part, (count,): fixed points, and the others evenly between them."""
+    """The part of each point (count,) of a line and the fraction of it before the point; points lie evenly between fixed points."""
     at = np.rint(np.array(places) * (count - 1)).astype(np.int64)
     steps = np.arange(len(at))
     at = np.maximum.accumulate(at - steps) + steps  # each at least one point after the previous one

@@ -1,4 +1,4 @@
-"""Programs of other people as subprocesses: their time and memory, a time limit, and the end of all processes that they start."""
+"""Programs of other people as subprocesses: their time and memory, a time limit, and the end of every process that they start."""
 
 import os
 import shutil
@@ -74,7 +74,7 @@ def run(words: list[str], directory: Path, time_limit: float) -> Ended:
 
 @contextmanager
 def _started(words: list[str], directory: Path, printed: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
-    """The process, in its own session, which ends here with all its processes."""
+    """A context with the process, in its own session; at the end of the context all processes of this session are killed."""
     process = subprocess.Popen(
         words, cwd=directory, stdin=subprocess.DEVNULL, stdout=printed, stderr=printed, start_new_session=True
     )

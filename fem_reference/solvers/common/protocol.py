@@ -120,7 +120,7 @@ AnySolver = Solver[Any, Any]
 @dataclass(frozen=True)
 class Trade:
     """Marks a settings key that trades time for accuracy: a ``ladder`` of useful values, as scene files write them, from the
-    fastest to the most accurate. A scene may not allow some of them, such as elements for other cells or effects.
+    fastest to the most accurate. Some values may be refused for a scene, such as elements for other cells or effects.
     """
 
     ladder: tuple[float | str, ...]

@@ -47,7 +47,7 @@ __all__ = ["BodySettings", "FieldSettings", "Settings", "session", "shared", "so
 
 
 def require(settings: BodySettings | FieldSettings) -> None:
-    """Raise MissingSoftware if FEniCSx is not installed or the requested ranks cannot be started."""
+    """Raise MissingSoftware if FEniCSx or the ``mpiexec`` for the ranks is missing, InputError for too many ranks."""
     require_installed()
     if isinstance(settings, Settings):
         command_line(settings.ranks or 1)

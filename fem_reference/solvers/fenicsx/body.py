@@ -39,7 +39,7 @@ from fem_reference.solvers.fenicsx.validity import Validity
 
 
 class AssembledBody:
-    """The unknowns of a body, made of an element of ``ELEMENTS``, and their equations."""
+    """The unknowns of a body with an element of ``ELEMENTS``, and their equations."""
 
     def __init__(self, body: Body, settings: BodySettings) -> None:
         self.comm, self.reuse, self.effects = MPI.COMM_WORLD, settings.reuse and not body.remembers, body.effects

@@ -68,7 +68,7 @@ class CellSums:
         self.projection = self._projection() if is_stabilised(element) else None
 
     def structure(self) -> Structure:
-        """The sparsity of the entries of cells, extended by the whole diagonal."""
+        """The sparsity of the entries of cells, extended by the full diagonal."""
         starts = np.arange(0, self.unknowns.size + 1, self.unknowns.shape[1])
         entries = np.ones(self.unknowns.size, bool), self.unknowns.ravel(), starts
         has = csr_array(entries, shape=(self.count, self.size))
@@ -180,8 +180,8 @@ class CellSums:
 
 
 def _without_pressure(values: Floats, others: int) -> Floats:
-    """First derivatives with respect to the ``others`` and the pressure, and the upper triangle of the second derivatives, (...,
-    v). The stiffness due to the pressure, K cof F x cof F, replaces the terms that couple the pressure with the others.
+    """The derivatives ``values`` (..., v), first and upper triangle of the second, once the pressure follows the volume: its
+    stiffness, K cof F x cof F, replaces the terms that couple it with the ``others`` (the number of other variables).
     """
     values, (rows, columns) = values.copy(), np.triu_indices(others + 1)
     second, last = values[..., others + 1 :], columns == others

@@ -32,7 +32,7 @@ OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's compilation, by one process at a time. A lock per form would cost more: a signature takes longer than the search."""
+    """FFCx's compilation, by one process at a time. A lock per form would need its signature, which costs more than the search."""
 
     @wraps(compiled)
     def waiting(objects: list[Any], *given: Any, **options: Any) -> R:

@@ -123,12 +123,12 @@ class ContactForces:
         return places, gap + self.law.allowance(frame) * self.overlaps[i][which]
 
     def _local(self, i: int, frame: float, moved: Floats, some: Ints) -> Floats:
-        """The positions (k, 3) [mm] of ``some`` points (k,) in bone ``i`` at ``frame``, the nodes displaced by ``moved``."""
+        """The positions (k, 3) [mm] of ``some`` points relative to bone ``i`` at ``frame``, with nodes displaced by ``moved``."""
         pose = self.bones[i].pose(frame)
         return np.asarray((self._places(moved, some) - pose[:3, 3]) @ pose[:3, :3])
 
     def _places(self, moved: Floats, some: Ints) -> Floats:
-        """The positions (k, 3) [mm] of ``some`` points (k,), with nodes displaced by ``moved`` (m, 3)."""
+        """The positions (k, 3) [mm] of ``some`` points (k,); nodes are displaced by ``moved`` (m, 3)."""
         return np.asarray(self.points.rest[some] + self.points.carried.shares[some] @ moved)
 
     def presses(self) -> bool:

@@ -45,7 +45,7 @@ class Determinants:
     """Det F at the quadrature points and the vertices of this rank's cells."""
 
     def __init__(self, displacement: Displacement, cells: Ints, determinant: Any, rule: Floats, kind: Kind) -> None:
-        """``cells``: the number in the body of each cell here; ``rule``: the quadrature points (q, 3) of a ``kind`` of cell."""
+        """``cells``: the index in the body of each cell of this rank; ``rule``: quadrature points (q, 3) of a ``kind`` of cell."""
         self.mesh, self.cells, self.unknowns = displacement.space.mesh, cells, displacement.unknowns.x
         vertices = reference_nodes(kind, 1)
         # Compiled, as each iteration needs it, and by all ranks together, even ranks without cells.

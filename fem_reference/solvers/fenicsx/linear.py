@@ -1,4 +1,4 @@
-"""Linear systems solved with a sparse factorisation (MUMPS), used as long as it is a good preconditioner."""
+"""Linear systems solved with a sparse factorisation (MUMPS), reused as long as it is a good preconditioner."""
 
 from itertools import count
 

@@ -25,8 +25,8 @@ from fem_reference.solvers.fenicsx.meshes import geometry
 
 # A cell with less than this fraction of its rest volume has collapsed, whatever the ranges of laws: about four fifths of muscle are
 # water, which does not leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal muscle),
-# and a fifth of the volume would barely contain the solid part. A body has collapsed if the cells that have collapsed had more than
-# this fraction of its rest volume; at a rim this fraction decreases with the size of cells.
+# and a fifth of the volume would barely contain the solid part. A body has collapsed if collapsed cells make up more than this
+# fraction of its rest volume; those that collapse at a rim make up less, the smaller they are.
 COLLAPSED, SHARE = 0.2, 0.01
 _SCALARS = {"V/V0": "cell_volume_ratio", "fibre stretch": "cell_fibre_stretch"}
 
