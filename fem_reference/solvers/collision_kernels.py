@@ -94,8 +94,8 @@ def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats)
 
 @compiled
 def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) -> tuple[Ints, Floats]:
-    """Indices (k,) and positions (k, 3) of the ``points`` (n, 3) that moved ``clear`` (n,) [mm] or more since the last check, which
-    was at ``asked_at`` (n, 3). Returned positions and ``asked_at`` are in the rest frame of a bone that is now at ``pose``.
+    """Indices (k,) and positions (k, 3) of the ``points`` (n, 3) that moved ``clear`` (n,) [mm] or more since the last check, when
+    they were at ``asked_at`` (n, 3). Returned positions and ``asked_at`` are in the rest frame of a bone that is now at ``pose``.
     """
     found, places = np.empty(len(points), np.int64), np.empty_like(points)
     count = 0
