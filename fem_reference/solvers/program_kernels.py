@@ -2,7 +2,7 @@
 
 The code follows the program's source. As the result is chaotic, the last digit matters: each sum has the order that gcc 12 produces
 with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than SSE2), as
-found in the machine code. Do not simplify the sums. Arrays should be writable and C-contiguous; the loops compile anew for others.
+found in the machine code. Do not simplify the sums. For arrays that are not writable and C-contiguous, loops are compiled again.
 """
 
 import math

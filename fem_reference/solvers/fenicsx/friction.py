@@ -74,7 +74,7 @@ class Friction:
         return slip, change
 
     def settle(self, grip: Grip) -> None:
-        """From now on hold only the points of ``grip``, at its places ``stuck``."""
+        """Hold only the points of ``grip``, at its places ``stuck``, until the next call."""
         self.stuck[:] = np.nan
         self.stuck[grip.which] = grip.stuck
 

@@ -96,7 +96,7 @@ class Rubbing:
         self.facets, self.at, self.settled = np.full(len(one.areas), -1), np.zeros((len(one.areas), 2)), np.zeros(count)
 
     def settle(self, met: Met, held: Floats, unknowns: Floats) -> None:
-        """From now on hold the points that ``met`` facets, at the places ``held`` (k, 2) on these, and no other points."""
+        """Hold only the points that ``met`` facets, at the places ``held`` (k, 2) on these, until the next call."""
         self.acts = self.law.relaxed is None or self.one.share == 0
         self.facets[:] = -1
         self.facets[met.points], self.at[met.points], self.settled = met.facets, held, np.array(unknowns)
