@@ -223,7 +223,7 @@ def multiplier_step(value: float, weight: float, softness: float, multiplier: fl
 def pull_distances(
     points: Floats, inverse_masses: Floats, edges: Ints, rest: Floats, softness: Floats, multipliers: Floats
 ) -> None:
-    """One projection of the length of each of the ``edges`` (e, 2), ``rest`` (e,) [mm] at rest; ``softness`` a (e,) [1/t]."""
+    """Project the length of each of the ``edges`` (e, 2) once, ``rest`` (e,) [mm] at rest; ``softness`` a (e,) [1/t]."""
     for h in range(len(edges)):
         i, j = edges[h, 0], edges[h, 1]
         length, direction = distance(at(points, i), at(points, j))
@@ -238,7 +238,7 @@ def pull_distances(
 def pull_volume(
     points: Floats, inverse_masses: Floats, triangles: Ints, rest: float, softness: float, multiplier: float
 ) -> float:
-    """One projection of six times the volume inside ``triangles`` (m, 3), ``rest`` [mm3] at rest; ``softness`` a [mm4/t].
+    """Project six times the volume inside ``triangles`` (m, 3) once, ``rest`` [mm3] at rest; ``softness`` a [mm4/t].
 
     Returns the new multiplier.
     """
@@ -257,7 +257,7 @@ def pull_volume(
 def pull_dihedrals(
     points: Floats, inverse_masses: Floats, hinges: Ints, rest: Floats, softness: Floats, multipliers: Floats
 ) -> None:
-    """One projection of the angle of each of the ``hinges`` (e, 4), ``rest`` (e,) [rad] at rest; ``softness`` a (e,) [1/(t mm2)].
+    """Project the angle of each of the ``hinges`` (e, 4) once, ``rest`` (e,) [rad] at rest; ``softness`` a (e,) [1/(t mm2)].
 
     As in position based dynamics, no projection turns a pair by more than ``LARGEST_TURN``.
     """

@@ -96,7 +96,7 @@ def angles_of(normals: Floats, pairs: Ints) -> Floats:
 
 @compiled
 def _turn(point: Vector, other: Vector, own: Vector, cosine: float) -> Vector:
-    """``point x other + cosine own x point``, a term of the gradients of the cosine of two unit normals (Mueller 2007)."""
+    """``point x other + cosine own x point``, a term in the gradients of the cosine between two unit normals (Mueller 2007)."""
     return plus(cross(point, other), times(cosine, cross(own, point)))
 
 

@@ -3,7 +3,7 @@
 k rods of p points each have ``points`` (k, p, 3) and ``radii`` (k, p) [mm], and ``turns`` (k, p + 1, 4): unit quaternions
 (w, x, y, z) that rotate each segment's frame from rest; the first and last are the rotations of the two bones, which prescribe the
 end points. All constraints of a kind are projected at once (Jacobi), with steps so small that their sum with the steps of
-neighbours does not overshoot. The limit is the least sum of squares if constraints contradict each other, for any order of points.
+neighbours does not overshoot. If constraints contradict each other, the limit is the least sum of squares, for any order of points.
 """
 
 import numpy as np

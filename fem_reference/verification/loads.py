@@ -17,7 +17,7 @@ from fem_reference.verification.homogeneous import BULK, MU, NEO, SIZE, STEPS, S
 loads = parts.find("loads")
 MUSCLE, FAT = 1.06e-9, 0.92e-9  # densities [tonne/mm3]
 FREE_FALL = 9810.0  # mm/s2
-LARGE = (100.0, 50.0, 60.0)  # sides of a block of muscle of 300 ml [mm]
+LARGE = (100.0, 50.0, 60.0)  # sides [mm] of a block of muscle, whose volume is 300 ml
 # Height of a soft column [mm], its bulk modulus [MPa] and its weight [N/mm3], under which it sinks by a tenth of its height.
 HEIGHT, SOFT, WEIGHT = 10.0, 5 * MU, 1e-3
 FLUID, COMPRESSIBLE = 0.1, 1.0  # a pressure, and the bulk modulus of the block that it shrinks [MPa]

@@ -29,7 +29,7 @@ _SETTINGS = {
 }
 # The number of ranks that is accepted on any machine; more ranks need a machine with as many cores.
 _MOST_RANKS = 8
-PATIENCE = 5.0  # [s] between the first request that a process end and the signal that kills it
+PATIENCE = 5.0  # [s] from the request to end a process to the signal that kills it
 # The allowed clock time, as a multiple of the limit of processor time plus the start-up time; a run beyond it allows no conclusion.
 CLOCK, _START = 20, 3.0  # [s]
 _GLANCE = 0.02  # [s] between checks of the processor time

@@ -28,7 +28,7 @@ _GLANCE = 0.2  # [s] over which the load of the cores is measured
 
 
 def unknowns(cells: Cells, element: str) -> int:
-    """The approximate number of unknowns of a body of ``cells`` with an ``element``; a quadratic one has a node on every edge."""
+    """The approximate number of unknowns on ``cells`` with an ``element``; a quadratic element has a node on every edge."""
     kind, degree, pressure = ELEMENTS[element]
     corners = cells.cells[:, : 4 if kind == "tetrahedron" else 8]
     count = len(np.unique(corners))
