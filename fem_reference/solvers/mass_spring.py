@@ -53,7 +53,7 @@ class MassSpringSettings(Record):
     single small mass would make every time step small. ``frame_time``: the solver's time between successive frame numbers, in place
     of the scene's interval; the longer it is, the nearer the muscle is to equilibrium. ``damping``: the coefficient c, or
     ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an acceleration, by default none. ``collision``: contact with
-    bones at every step, by default none. ``time_step``: its upper limit, by default 0.9 of the stable time step.
+    bones at every step, by default none. ``time_step``: the maximum, by default 0.9 of the stable time step.
     """
 
     stiffness: Stiffness

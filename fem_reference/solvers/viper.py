@@ -5,9 +5,9 @@ and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep 
 stretched. Shape matching ties the rods of a bundle; its scale also scales the radii. The surface moves with the rods.
 
 Each fibre of the case is a rod. For bend and twist, the bones nearest to its ends act like neighbouring segments. There is neither
-mass nor time: a frame number begins with the previous state, moved by a blend of the bones' motions. A stiffness is the fraction of
-an error that a sweep removes, as in ``pbd``, so the result depends on ``iterations``. All rods have the same radius at rest, chosen
-so that they fill the muscle's volume. Only rods keep their volume; the volume inside the surface may change.
+mass nor time: a frame number begins with the previous state, moved by a blend of the bones' motions. A stiffness is a factor on the
+corrections of a sweep, as in ``pbd``, so the result depends on ``iterations``. All rods have the same radius at rest, chosen so
+that they fill the muscle's volume. Only rods keep their volume; the volume inside the surface may change.
 """
 
 from typing import Annotated

@@ -65,4 +65,4 @@ class Job:
     def __post_init__(self) -> None:
         if not self.body.has_energy and self.settings.follow == "stable":
             got = f'"stable" with {"friction" if self.body.rubs else "contact along own normals"}'
-            raise InputError("follow", got, '"equilibrium", as negative modes are not counted here')
+            raise InputError("follow", got, '"equilibrium", as negative modes are not counted then')

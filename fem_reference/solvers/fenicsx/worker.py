@@ -99,7 +99,7 @@ class Worker:
         return result
 
     def solve_exactly(self) -> bool:
-        """Solve linear systems exactly from now on, as inexact solutions move a nearly free body too far. True if this is new."""
+        """Solve linear systems exactly from now on, as inexact solutions move a nearly free body too far. True if changed."""
         other = self.body.linear.solve_exactly()
         self.exact |= other
         return other
