@@ -19,8 +19,8 @@ __all__ = ["check", "choice", "find", "in_table", "names", "offers", "settings",
 
 
 def names(task: Task | None = None) -> list[str]:
-    """The names of all solvers in scene files, or of those for a ``task``."""
-    # Without modules that only serve solvers.
+    """The names of all solvers that a scene file may choose, or only of those for a ``task``."""
+    # The folder common and the modules of kernels serve solvers and are not solvers themselves.
     found = [name for name in modules.names(__path__) if name != "common" and not name.endswith("_kernels")]
     return [name for name in found if task is None or any(offer.task == task for offer in offers(name))]
 
@@ -55,7 +55,7 @@ def find(name: str, place: str, task: Task = "solve") -> Solver[Any, Any]:
 
 
 def in_table(kind: str | None = None) -> tuple[Candidate, ...]:
-    """The candidates that solvers offer for the page table-5-1: all, or those of a ``kind`` of the report's Table 5.1."""
+    """The candidates that solvers offer for the page table-5-1: all, or those of one ``kind`` in the report's Table 5.1."""
     return tuple(
         Candidate(name=row.name, solver=name, **row.settings)
         for name in names("solve")
@@ -65,7 +65,7 @@ def in_table(kind: str | None = None) -> tuple[Candidate, ...]:
 
 
 def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
-    """A run's name and settings for ``name``, a solver or candidate: from the case, else the page table-5-1, else the defaults."""
+    """The name and settings of a run by ``name``, a solver or candidate: from the case, else from table-5-1, else the defaults."""
     own = [one for one in case.candidate if one.solver == name] + [one for one in case.candidate if one.name == name]
     table = [one for one in in_table() if one.solver == name and case.task == "solve"]
     for one in (*own, *table):
@@ -79,13 +79,13 @@ def takes_effects(name: str) -> bool:
 
 
 def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str, task: Task = "solve") -> None:
-    """Raise InputError below ``place`` if ``settings`` do not suit the ``effects``."""
+    """Raise InputError below ``place`` if the solver ``name`` with these ``settings`` does not accept the ``effects``."""
     offer = find(name, place, task)
     if isinstance(offer, MuscleSolver) and offer.check_effects is not None:
         offer.check_effects(settings, effects, place)
 
 
 def settings(choice: SolverChoice, place: str, task: Task = "solve") -> Record:
-    """The settings of a choice, checked by its solver; ``place`` is where the scene makes the choice."""
+    """The settings in ``choice``, parsed into the record of its solver; InputError below ``place`` if they are invalid."""
     record: type[Record] = find(choice.solver, place, task).record(choice.settings, place)
     return parse(record, choice.settings, place)

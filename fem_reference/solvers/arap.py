@@ -4,7 +4,7 @@ Frame number n is the state with the bones in their pose of frame n. Attached ve
 previous state, the method alternates between the rotations of all cells (local step) and the positions of free vertices (global
 step). If the rows of attached vertices are removed and the weight of an edge is the same from both ends, both steps minimise eq.
 5.10, each over its own unknowns, so the energy never rises. Negative weights do not change this, as the matrix is still the
-positive matrix of linear elements. Attachments by springs are treated as exact, and there is no contact.
+positive stiffness matrix of linear elements. Attachments by springs are treated as exact, and there is no contact.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,7 @@ Symmetric = Literal["cotangent", "clamped cotangent", "kirchhoff"]
 Weights = Literal[Symmetric, "tutte"]
 Fixed = Literal["remove", "ols"]
 
-# A triangle counts as degenerate if its height is at most this share of its longest side.
+# A triangle counts as degenerate if its height is at most this fraction of its longest side.
 _NO_AREA = 1e-6
 
 
@@ -40,13 +40,13 @@ class ArapSettings(Record):
 
     ``weights`` of edges: "cotangent" (eq. 5.13), "clamped cotangent" (negative weights set to 0), "kirchhoff" (all 1), "tutte"
     (kirchhoff, each row divided by its diagonal). A cotangent weight is negative if the angles opposite its edge sum to more than
-    pi. If such weights are kept, as in libigl, a half turn of a cell may lower the energy, so rest is unstable. ``fixed``: the rows
+    pi. With negative weights, as in libigl, a half turn of a cell may lower the energy: the rest state is unstable. ``fixed``: rows
     and columns of attached vertices are removed ("remove"), or only the columns are removed and all rows are solved by least
     squares ("ols", eq. 5.12). With removed rows, tutte gives the same states as kirchhoff. ``rotations`` are fitted before "each"
-    global step, or once in a frame ("first only"), in which case later iterations change nothing. ``volume_step``: after each
-    global step the free vertices are scaled by eq. 5.9 about the mean of all vertices. ``iterations``: their number in each frame,
-    which determines the result if there is no ``tolerance``. With a ``tolerance`` [mm] a frame ends as soon as no vertex moves
-    farther than this in an iteration; if a frame needs more iterations, the run ends ``out of steps``.
+    global step, or once per frame ("first only"), in which case later iterations change nothing. ``volume_step``: after each
+    global step the free vertices are scaled by eq. 5.9 about the mean of all vertices. ``iterations``: the number per frame, exact
+    without a ``tolerance`` and otherwise the maximum. With a ``tolerance`` [mm] a frame ends as soon as no vertex moves farther
+    than this in an iteration; if a frame does not meet it within ``iterations``, the run ends ``out of steps``.
     """
 
     weights: Weights
@@ -82,7 +82,7 @@ class GlobalStep:
 
     ``pick`` (m, n) multiplies both sides: it selects the rows of free vertices or, for least squares, is the transpose of their
     columns. ``coupling`` (m, k): the columns of attached vertices, also multiplied. ``loose``: free vertices that no weights
-    connect to an attached vertex. If there are any, or nothing or all is attached, there is no ``factor``: free vertices stay.
+    connect to an attached vertex. ``factor``: None if there are loose, no attached or no free vertices; no vertex moves then.
     """
 
     cells: VertexCells
@@ -116,7 +116,7 @@ class GlobalStep:
 
 @dataclass(frozen=True, eq=False)
 class Relaxed:
-    """The ``points`` (n, 3) [mm] of a frame after ``iterations``; ``met``: True if the tolerance, if any, is met; the trouble."""
+    """The ``points`` (n, 3) [mm] of a frame after ``iterations``; ``met``: False if a tolerance is missed; ``trouble``, if any."""
 
     points: Floats
     iterations: int
@@ -125,7 +125,7 @@ class Relaxed:
 
 
 class Alternation(MovingSurface):
-    """A surface whose free vertices ``relax`` after the attached vertices have moved."""
+    """A surface whose free vertices are moved by ``relax`` after the attached vertices have moved."""
 
     advice = "a slower motion may help"
 
@@ -157,7 +157,7 @@ class Alternation(MovingSurface):
         done = f"{frames} frames in {self.cost['local_global_steps']:.0f} iterations"
         if missed := self.cost["frames_off_tolerance"]:
             advice = "more iterations or a larger tolerance may help"
-            return Outcome("out of steps", f"{done}, of which {missed:.0f} did not meet the tolerance; {advice}")
+            return Outcome("out of steps", f"{done}; {missed:.0f} frames did not meet the tolerance; {advice}")
         return Outcome("converged", done)
 
 
@@ -208,7 +208,7 @@ def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats
 
 
 def farthest(displacements: Floats) -> float:
-    """The greatest length of ``displacements`` (n, 3)."""
+    """The maximum length of ``displacements`` (n, 3)."""
     return float(np.sqrt(np.max(np.einsum("ij,ij->i", displacements, displacements))))
 
 
@@ -246,6 +246,6 @@ def _edge_weights(surface: Surface, name: Weights) -> Any:
 
 _REPORTED = {"weights": "clamped cotangent", "fixed": "remove", "rotations": "each", "volume_step": False}
 _REPORTED |= {"iterations": 4}
-# The second row of the table is scaled by eq. 5.9 after each iteration (section 6.2).
+# The second row includes the volume step, eq. 5.9, in each iteration (section 6.2).
 _TABLE = (TableRow("ARAP", "arap", _REPORTED), TableRow("ARAP", "arap_volume_step", _REPORTED | {"volume_step": True}))
 SOLVES = (MuscleSolver(settings=ArapSettings, solve=solve, example=_REPORTED | {"iterations": 3}, table=_TABLE),)

@@ -45,7 +45,7 @@ def _turn(matrix: Floats, vectors: Floats, p: int, q: int) -> None:
 
 @compiled
 def _diagonalise(matrix: Floats, vectors: Floats) -> None:
-    """Make the symmetric ``matrix`` (4, 4) diagonal by Jacobi's rotations; the columns of ``vectors`` become its eigenvectors."""
+    """Make the symmetric ``matrix`` (4, 4) diagonal by Jacobi rotations; the columns of ``vectors`` become its eigenvectors."""
     vectors[:] = 0.0
     for k in range(4):
         vectors[k, k] = 1.0
@@ -62,9 +62,9 @@ def _diagonalise(matrix: Floats, vectors: Floats) -> None:
 
 @compiled
 def _rotate(covariance: Floats, matrix: Floats, vectors: Floats, rotation: Floats) -> None:
-    """The ``rotation`` R (3, 3), det R = 1, for which sum_ab R_ab C_ba is greatest; ``matrix``, ``vectors`` (4, 4) are scratch.
+    """The ``rotation`` R (3, 3), det R = 1, that maximises sum_ab R_ab C_ba; ``matrix`` and ``vectors`` (4, 4) are scratch.
 
-    As a quaternion the rotation is the eigenvector of the greatest eigenvalue of a 4 x 4 matrix made of C (Horn 1987,
+    As a quaternion the rotation is the eigenvector of the largest eigenvalue of a 4 x 4 matrix made of C (Horn 1987,
     doi:10.1364/JOSAA.4.000629). The report's singular value decomposition gives the same rotation, except in cells that are flat or
     inside out, for which it gives a reflection.
     """

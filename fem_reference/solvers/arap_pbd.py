@@ -1,4 +1,4 @@
-"""ARAP (as rigid as possible) with position based dynamics: the two combinations that report 6.2 and 7.2 propose.
+"""ARAP (as rigid as possible) with position based dynamics: the two combinations that report sections 6.2 and 7.2 propose.
 
 *The volume as a constraint* of the ARAP energy, instead of a scaling after each step: the positions of a global step solve
 ``L p' = b + lambda grad V``. The gradient is taken at the previous iteration, and the multiplier lambda is chosen so that the
@@ -26,7 +26,7 @@ from fem_reference.solvers.pbd_kernels import volume
 
 # Newton's method for the volume stops at this relative error, or after this many steps.
 _REACHED, _STEPS = 1e-12, 20
-# A root counts as real if its imaginary part is at most this share of the root.
+# A root counts as real if its imaginary part is at most this fraction of its magnitude.
 _REAL = 1e-8
 # The volume counts as preserved up to this relative error.
 _KEPT = 1e-6
@@ -57,7 +57,7 @@ class ArapPbdSettings(Record):
 
     _check = rule(
         lambda one: one.volume_constraint or one.projections is not None,
-        'volume_constraint = true or "projections" (without both it is the solver arap)',
+        'volume_constraint = true or "projections" (without either it is the solver arap)',
     )
 
 
@@ -80,7 +80,7 @@ def _alternation(setup: Setup, settings: ArapPbdSettings) -> Alternation:
 
 
 def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest: PbdConstraints) -> Relaxed:
-    """Local and global steps from ``points`` (n, 3), as many as the settings require, at the volume of ``rest`` if required.
+    """Alternate local and global steps from ``points`` (n, 3), at the volume of ``rest`` if ``volume_constraint`` is set.
     Diverged if the volume constraint moves a point from the minimum of a global step by more than the edge of a cube of that
     volume: the volume is then preserved only by folds, at another root of the cubic.
     """
@@ -102,8 +102,8 @@ def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest
 def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdConstraints) -> Floats:
     """``p + lambda L^-1 grad V``, with the lambda nearest to 0 at which the volume equals the volume of ``rest``.
 
-    p is the ``minimum`` (n, 3) of the global step, and the gradient is taken at the positions ``before`` it. The volume is a cubic
-    in lambda; Newton's method refines its root nearest to 0. Without a root the minimum is returned.
+    p is the ``minimum`` (n, 3) of the global step, and the gradient is taken at the positions ``before`` that step. The volume is a
+    cubic polynomial of lambda; Newton's method refines the root nearest to 0. Without a root the minimum is returned.
     """
     direction = np.zeros_like(minimum)
     if system.factor is None:
@@ -124,8 +124,8 @@ def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdCons
 def least_root(points: Floats, direction: Floats, rest: PbdConstraints) -> float | None:
     """The lambda nearest to 0 at which ``points + lambda direction`` (n, 3) have the volume of ``rest``, None if there is none.
 
-    Six times the volume is a cubic form: its coefficients are values and slopes at ``points`` and at ``direction``. The cubic is
-    solved for ``1 / lambda``, which stays accurate if the cubic term nearly vanishes.
+    Six times the volume is a cubic form, so values and slopes at ``points`` and at ``direction`` give the coefficients in lambda.
+    The cubic is solved for ``1 / lambda``, which stays accurate if the cubic term nearly vanishes.
     """
     (value, slope), (cubic, slope_of_direction) = volume(points, rest.triangles), volume(direction, rest.triangles)
     off = value - rest.six_volumes

@@ -2,8 +2,8 @@
 
 The distance to a bone is computed only for vertices that may be near the bone. A distance changes by at most the displacement, so a
 vertex whose displacement relative to the bone is less than its last distance is still outside. Only vertices are checked, at their
-new positions and not on the path: a sharp edge may pass between them, and a vertex that goes through a thin bone in one step comes
-out on the other side. The distance to a bone of triangles is stored on a grid along the axes at rest, so results depend on the
+new positions and not along their paths: a sharp edge may pass between them, and a vertex that crosses a thin bone in one step ends
+on the other side. The distance to a bone of triangles is stored on a grid aligned with the axes at rest, so results depend on the
 axes: if the entire scene is rotated, vertices in the case hip_flexion with ``pbd`` differ by up to 1.2 mm (mean 0.1 mm).
 """
 
@@ -36,7 +36,7 @@ class Contacts(NamedTuple):
 
 @compiled
 def _splines(t: float) -> tuple[Four, Four]:
-    """Values and slopes of the four cubic B-splines that reach into a cell, at ``t`` from 0 to 1 across it."""
+    """Values and slopes of the four cubic B-splines that are not zero in a cell, at ``t`` from 0 to 1 across the cell."""
     s = 1 - t
     values = (s * s * s / 6, (4 - 6 * t * t + 3 * t * t * t) / 6, (4 - 6 * s * s + 3 * s * s * s) / 6, t * t * t / 6)
     slopes = (-s * s / 2, (3 * t * t - 4 * t) / 2, (4 * s - 3 * s * s) / 2, t * t / 2)
@@ -45,14 +45,14 @@ def _splines(t: float) -> tuple[Four, Four]:
 
 @compiled
 def _cell(place: float, count: int) -> tuple[int, float]:
-    """The index of the cell that contains ``place`` [cells], on an axis of ``count`` nodes, and the position in it, 0 to 1."""
+    """The index of the cell that contains the position ``place`` [cells] on an axis of ``count`` nodes, and ``place`` within it."""
     cell = min(int(place), count - 3)
     return cell, place - cell
 
 
 @compiled
 def _spline(coefficients: Floats, x: float, y: float, z: float) -> tuple[float, Vector]:
-    """Value and gradient of the spline at a place inside its grid, counted in cells from its origin."""
+    """Value and gradient of the spline at a position inside its grid, in cells from the grid's origin."""
     i, within_x = _cell(x, coefficients.shape[0])
     j, within_y = _cell(y, coefficients.shape[1])
     k, within_z = _cell(z, coefficients.shape[2])
@@ -76,7 +76,7 @@ def _spline(coefficients: Floats, x: float, y: float, z: float) -> tuple[float, 
 
 @compiled
 def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats) -> tuple[Floats, Floats]:
-    """Distance (n,) [mm] and gradient (n, 3) at ``points`` (n, 3), by the ``Grid`` of these coefficients."""
+    """Distance (n,) [mm] and gradient (n, 3) at ``points`` (n, 3), from the ``Grid`` with these coefficients."""
     distance, gradient = np.full(len(points), FAR), np.zeros_like(points)
     last_x, last_y, last_z = coefficients.shape[0] - 2, coefficients.shape[1] - 2, coefficients.shape[2] - 2
     for n in range(len(points)):
@@ -94,8 +94,8 @@ def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats)
 
 @compiled
 def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) -> tuple[Ints, Floats]:
-    """Indices (k,) and positions (k, 3) of the ``points`` (n, 3) at a distance of ``clear`` (n,) [mm] or more from their places at
-    the last check, ``asked_at`` (n, 3), all in the coordinates of the rest pose of a bone at ``pose``.
+    """Indices (k,) and positions (k, 3) of the ``points`` (n, 3) that moved ``clear`` (n,) [mm] or more since the last check, when
+    they were at ``asked_at`` (n, 3). Returned positions and ``asked_at`` are in the rest frame of a bone that is now at ``pose``.
     """
     found, places = np.empty(len(points), np.int64), np.empty_like(points)
     count = 0
@@ -114,8 +114,8 @@ def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) ->
 
 
 class CollidingBone:
-    """A bone, its allowed distance from each vertex, and the last known distances. A vertex may come as near as ``gap`` [mm], or as
-    at rest if that is nearer, so that nothing jumps at the first step. Vertices that are not ``free`` (n,) are never checked.
+    """A bone, its smallest ``allowed`` distance (n,) from each vertex, and the distances at the last check. The allowed distance is
+    ``gap`` [mm], or the distance at rest if less: nothing jumps at the first step. Vertices not ``free`` (n,) are never checked.
     """
 
     def __init__(self, bone: Bone, rest: Floats, free: NDArray[np.bool_], gap: float) -> None:
@@ -144,7 +144,7 @@ class CollidingBone:
         return Contacts(vertices, distance - allowed, away @ self.pose[:3, :3].T)
 
     def watch(self, vertices: Ints) -> None:
-        """Check these vertices the next time, wherever they are."""
+        """Include these ``vertices`` (k,) in the next check, wherever they are."""
         self.clear[vertices] = 0
 
     def _sample(self, places: Floats) -> tuple[Floats, Floats]:

@@ -36,7 +36,7 @@ from fem_reference.solvers.common.protocol import Moves, MuscleSolver, Trade
 
 _PLACEHOLDER = re.compile(r"\{([A-Za-z]\w*)\}")
 FOLDERS = ("scene", "out")
-REFUSED = 77  # the exit status of a program that does not support a scene, as of a test skipped under Automake
+REFUSED = 77  # the exit status of a program that does not support a scene; Automake uses it for skipped tests
 # The code of a separate Python process: call a pickled function with the folders.
 _CALL = "import pathlib, pickle, sys; a = [*map(pathlib.Path, sys.argv[1:])]; pickle.loads(a[0].read_bytes())(*a[1:])"
 Value = int | float | str
@@ -78,8 +78,8 @@ class CommandSettings(Record):
 
 
 def sources(settings: CommandSettings) -> list[Path]:
-    """The program; the files that the command names, also after ``=`` and as values of settings; with a Python file, all Python
-    files in its folder and below; and ``files``.
+    """The files that determine the results: the program; files that the command names, also after ``=`` and as values of settings;
+    for each Python file among them, all Python files in its folder and below; and ``files``.
     """
     directory, words = settings.place, _filled(settings, {})
     program = programs.found(words[0], directory)
@@ -119,8 +119,8 @@ class Description(recorded.About):
 
 
 def choice(command: str, directory: Path, place: str) -> Candidate:
-    """The ``command``, which runs in a ``directory``, as a candidate; ``place`` names it in messages. Its description is the
-    ``candidate.toml`` next to the first of its files that has one, else the file in the directory.
+    """The ``command``, which runs in a ``directory``, as a candidate; ``place`` names it in messages. Its description is a
+    ``candidate.toml``: next to the first file in the command that has one beside it, else in the directory.
     """
     names = placeholders(command, place)
     _check_program(command, directory, place)
@@ -142,7 +142,7 @@ def choice(command: str, directory: Path, place: str) -> Candidate:
 
 
 def of_function(function: Callable[..., None], given: Mapping[str, Any], folder: Path) -> SolverChoice:
-    """The command that calls ``function(scene, out, **settings)`` in another Python; ``given``: its settings, and keys of
+    """The command that calls ``function(scene, out, **settings)`` in another Python process; ``given``: its settings, and keys of
     :class:`CommandSettings`. The function, with the values, is written into a ``folder``.
     """
     own = {key: value for key, value in given.items() if key in CommandSettings.model_fields}
@@ -174,7 +174,7 @@ def placeholders(command: str, place: str) -> tuple[str, ...]:
     for folder in FOLDERS:
         if folder not in names:
             raise InputError(where, f'"{command}"', f"{{{folder}}} in it")
-    taken = {*CommandSettings.model_fields, *MACHINE_ONLY, "solver", "name", "folder"}  # the last is a file of a scene
+    taken = {*CommandSettings.model_fields, *MACHINE_ONLY, "solver", "name", "folder"}  # keys of scene files
     for name in names:
         if name in taken or hasattr(CommandSettings, name):
             raise InputError(where, f'"{{{name}}}"', "another name for the setting: this one is reserved")
@@ -184,12 +184,12 @@ def placeholders(command: str, place: str) -> tuple[str, ...]:
 def _check_named(key: str, names: tuple[str, ...], place: str) -> None:
     if key not in names:
         known = ", ".join(names) or "none"
-        raise InputError(f"{place}.{key}", "a setting that the command does not mention", f"one of its own: {known}")
+        raise InputError(f"{place}.{key}", "a setting that the command does not mention", f"one of these: {known}")
 
 
 @dataclass(frozen=True, kw_only=True)
 class CommandSolver(MuscleSolver[CommandSettings]):
-    """The offer, with the settings that the command mentions."""
+    """The solver, whose settings include those that the command mentions."""
 
     def record(self, given: Mapping[str, Any], place: str) -> type[CommandSettings]:
         """The record with a required key for each setting in the command; a setting with a ladder is marked as ``Trade``."""
@@ -204,7 +204,7 @@ class CommandSolver(MuscleSolver[CommandSettings]):
         return create_model(self.settings.__name__, __base__=self.settings, __doc__=self.settings.__doc__, **fields)
 
     def moved(self, settings: CommandSettings) -> Moves:
-        """The carrier of the unknowns that the settings state."""
+        """The carrier of the unknowns, as the settings state it."""
         return settings.moves
 
     def fills(self, settings: CommandSettings) -> bool:  # noqa: ARG002
@@ -213,7 +213,7 @@ class CommandSolver(MuscleSolver[CommandSettings]):
 
 
 def require(settings: CommandSettings) -> None:
-    """Raise InputError if there is no such program, or a file that it needs is missing."""
+    """Raise InputError if the program, or a file that it needs, is missing."""
     _check_program(settings.command, settings.place, "command")
     sources(settings)
 
@@ -225,7 +225,7 @@ def _check_program(command: str, directory: Path, place: str) -> None:
 
 
 def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outcome:
-    """Run the command and read the frames that it wrote. A failure is a status; frames before it are kept."""
+    """Run the command and read the frames that it wrote. A failure is a status; frames written before the failure are kept."""
     if problem.start is not None:
         raise InputError("command", "a body that does not start at rest", "a body at rest, as an export begins there")
     with scratch_folder() as folder:
@@ -242,7 +242,7 @@ def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outc
 
 
 def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended, out: Path, sink: Sink) -> Outcome:
-    """The outcome of a program that ``ended``, and its frames up to the first missing or damaged one; InputError if it refused."""
+    """The outcome of a program that ``ended``, with frames up to a missing or damaged one; InputError if it refused the scene."""
     if ended.code == REFUSED:
         raise InputError("command", ended.said or f"exit status {REFUSED}", "a scene that the program supports")
     free = len(problem.surface.points) - len(np.unique(problem.attached_vertices))
@@ -276,7 +276,7 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
 
 
 def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended) -> dict[str, float]:
-    """The time that the program states for solving its frames alone; InputError if this exceeds the time of its run."""
+    """The threads and the time for solving frames alone that the program states; InputError if this exceeds its running time."""
     found = {} if said.threads is None else {"threads": float(said.threads)}
     if said.seconds_per_frame is None:
         return found

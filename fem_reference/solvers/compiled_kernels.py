@@ -40,13 +40,13 @@ class _Compiled:
 
 
 def compiled[F: Callable[..., Any]](function: F) -> F:
-    """The function as machine code, made at its first call and kept on disk, if that can be written; it runs on one thread."""
+    """``function`` as machine code for one thread: compiled at the first call, and stored on disk if the disk can be written."""
     return cast(F, _Compiled(function))
 
 
 @cache
 def can_keep(folder: Path) -> bool:
-    """True if files can be written in a folder, which is created; False for a relative path, as for a user without a home."""
+    """True if files can be written in ``folder``, which is created; False for a relative path (a user without a home folder)."""
     if not folder.is_absolute():
         return False
     try:
@@ -59,10 +59,10 @@ def can_keep(folder: Path) -> bool:
 
 @cache
 def kept_code() -> Path:
-    """The folder where machine code of this version of the loops is kept; it may be deleted.
+    """The folder in which the machine code of these loops is stored; it may be deleted.
 
-    A compiled function contains the functions that it calls. numba checks only a function's own file for changes,
-    so each version of all loops together has a folder.
+    A compiled function contains the functions that it calls, but numba checks only the function's own file for changes. So the
+    folder's name is a hash of all files of kernels.
     """
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*_kernels.py")):

@@ -1,8 +1,8 @@
 """Lines of action: each fibre of the scene as one line between its bones, straight, through via-points or around an obstacle.
 
-Report 5.1 to 5.3. The ends of a line are the ends of the fibre, each fixed to the bone whose attachment is nearest at rest. Between
-two fixed points the line is as short as possible. A line has a length, with ``hill`` also a force, and no surface: only length and
-force are judged. A line goes around an obstacle on the shorter side: once its ends pass opposite points, it changes sides.
+Report sections 5.1 to 5.3. The ends of a line are the ends of the fibre, each fixed to the bone with the nearest attachment at
+rest. Between fixed points a line is as short as possible. It has a length, with ``hill`` also a force, and no surface: only length
+and force are judged. A line takes the shorter side of an obstacle, and so changes sides when its ends pass opposite points.
 """
 
 from itertools import pairwise
@@ -67,7 +67,7 @@ class Shortest:
         return _lengths(self.lines.at(number), self.wraps.around(self.lines.at(number).points, number))
 
     def move(self, number: int) -> None:
-        """Find the paths of the lines at a frame."""
+        """Compute the paths of the lines at frame ``number``."""
         passed = self.lines.at(number)
         wrong = self.wraps.inside(passed.points, number)[1]
         if not wrong:
@@ -80,13 +80,13 @@ class Shortest:
             lost = float((_lengths(passed, paths) - self.problem.fibres.lengths(points)).max())  # as chords are shorter
             try:
                 scalars = {"lost_by_chords_max": lost} | self._forces(passed, paths)
-            except InputError as error:  # no fibre of the model is as short or as long
+            except InputError as error:  # the line is too short or too long for the model of the muscle
                 self.wrong = Trouble("diverged", str(error))
                 return
             self.found = Frame(number, None, fibres=points, scalars=scalars)
 
     def _forces(self, passed: Passed, paths: Paths | Winding) -> dict[str, float]:
-        """Force [N] of lines, mean fibre length divided by the optimal length, forces on bones."""
+        """The force [N] of all lines, the mean fibre length divided by the optimal length, and the forces on bones."""
         if self.hill is None:
             return {}
         pairs = zip(self.muscles, _lengths(passed, paths).tolist(), strict=True)
@@ -95,11 +95,11 @@ class Shortest:
         return sums | _on_bones(self.problem.bones, self.wraps, passed, paths, found[:, 0])
 
     def trouble(self) -> Trouble | None:
-        """The trouble with a fixed point inside an obstacle or a path that was not found; None if there is none."""
+        """The trouble with a fixed point inside an obstacle, a path that was not found, or a line's force; None if none."""
         return self.wrong
 
     def frame(self, _: int) -> Frame:
-        """The lines."""
+        """The lines at the frame to which they moved last."""
         return self.found
 
     def ending(self) -> Outcome:
@@ -110,7 +110,7 @@ class Shortest:
 
 
 def solve(problem: MuscleProblem, settings: LineSettings, sink: Sink) -> Outcome:
-    """The lines at every requested frame, up to a frame with a fixed point in an obstacle; InputError if this is the first."""
+    """Compute the lines at the requested frames, up to the first trouble; InputError if a fixed point starts in an obstacle."""
     return each(Shortest(problem, settings), problem.frames, problem.frames, sink)
 
 
@@ -125,7 +125,7 @@ def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[L
     wraps = wraps_of(problem, settings.obstacle, place)
     name, inside = wraps.inside(lines.at(first).points, first)
     if inside:
-        raise InputError(join(place, name), inside, "an obstacle with all of them outside")
+        raise InputError(join(place, name), inside, "an obstacle with all fixed points outside")
     return lines, wraps
 
 

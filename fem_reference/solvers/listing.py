@@ -1,8 +1,8 @@
 """The report's Octave listings (4.1 on an interval, 4.5 on triangles): their results, even where they contradict the report's text.
 
 Listings 4.1, 4.2, 4.4 and 4.5 are transcribed. Vertices are numbered from 0 here and from 1 in the listings. ``bounds`` (2, m) is
-the listings' list of Dirichlet conditions: a row of vertices and a row of values. Lengths may have any unit: only the directions
-of the edges of a mesh count. validation/octave has the listings as run, their results, and how each misprint was read.
+the listings' list of Dirichlet conditions: a row of vertices and a row of values. Listing 4.5 uses only the directions of edges, so
+lengths may have any unit. validation/octave has the listings as run, their results, and the reading of each misprint.
 """
 
 import time
@@ -31,9 +31,9 @@ class ListingSettings(Record):
 
 
 def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outcome:
-    """The result of the listing for the problem's domain, with its mesh and fixed values, and the listing's own effects and slopes.
+    """Run the listing for the problem's domain, with the problem's mesh and fixed values; equation and slopes are the listing's.
 
-    Listing 4.5 plots the negative norm of its vector unknown. This is the field here, and the vector is its ``components``.
+    Listing 4.5 plots the negative norm of its vector unknown. This plotted value is the field; ``components`` has the vector.
     """
     begin = time.perf_counter()
     mesh = problem.mesh
@@ -95,7 +95,7 @@ def first_derivative(triangles: Ints, points: Floats) -> Any:
 
     For every edge of every triangle, with d its direction: ``d d^T`` is added to the blocks of both its ends and subtracted from
     the two blocks between them. A is not a differential operator: ``u^T A u = sum over edges of w (d . (u_s - u_t))^2`` is twice
-    the energy of springs along the edges, all of the same stiffness, whatever their length; w = 2 inside and 1 at the rim.
+    the energy of springs along the edges, whose stiffness w does not depend on their length: w = 2 inside and 1 at the rim.
     """
     dim = points.shape[1]
     s, t = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
@@ -118,8 +118,8 @@ def first_derivative(triangles: Ints, points: Floats) -> Any:
 def dirichlet(A: Any, b: Floats, dim: int, bounds: Floats) -> tuple[Any, Floats]:
     """Listing 4.4: A (n dim, n dim) and b (n dim,) with every component of the vertices of ``bounds`` (2, m) set to their value.
 
-    Their columns go to the right side; then their rows and columns become rows and columns of the unit matrix. A vertex that is
-    named twice is an error: the listing would use its first value for the neighbours and its last for the vertex itself.
+    Their columns are moved to the right side, and their rows and columns become those of the unit matrix. A vertex that is named
+    twice is an error: the listing would use its first value for the neighbours and its last value for the vertex itself.
     """
     vertices = bounds[0].astype(np.int64)
     if len(np.unique(vertices)) < len(vertices):

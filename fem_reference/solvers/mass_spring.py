@@ -1,8 +1,8 @@
 """A mass-spring system: report section 5.5.1, eqs 5.3 to 5.7.
 
 A volumetric model, as in Table 5.1: the masses are the points of the tetrahedra, and the springs are their edges. (Janak's masses
-sample fibres and are joined to masses nearby; here the mesh defines the springs.) The masses carry the surface and the fibres.
-Springs resist neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is ignored.
+are samples of fibres, joined to nearby masses.) The displacement of surface and fibres is interpolated from the masses. Springs
+resist neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is ignored.
 Contact acts on the masses of the surface only: the surface between them may be inside a bone.
 """
 
@@ -27,11 +27,11 @@ from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble
 from fem_reference.solvers.pbd import PbdCollision
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
 
-# The ratio of the default time step to the greatest stable one.
+# The ratio of the default time step to the largest stable time step.
 SHARE_OF_STABLE = 0.9
-# A run with more steps per frame number than this is refused: with 3,000 tetrahedra a frame number would take over two seconds.
+# A run with more steps per frame number than this is refused: with 3,000 tetrahedra each frame number would take over two seconds.
 _MOST_STEPS = 100_000
-# Time steps in one call of compiled code: the user can interrupt only between calls.
+# Time steps in one call of compiled code; the user can interrupt a run only between calls.
 _AT_ONCE = 200
 _REPORT = "eq. 5.5"
 
@@ -47,13 +47,13 @@ def _damping(text: object) -> float | str:
 
 
 class MassSpringSettings(Record):
-    """Stiffness and density of the muscle, and times of the solver.
+    """Stiffness, density, loads and time steps of the mass-spring system.
 
     ``stiffness``: of every spring. ``density``: of the muscle. All masses are equal, as equilibrium does not depend on masses and a
-    single small mass would make every time step small. ``frame_time``: the solver's time between successive frame numbers; the
-    longer it is, the nearer the muscle is to equilibrium. The scene's interval applies to the reference and to recorded sequences.
-    ``damping``: the coefficient c, or ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an acceleration, by default
-    none. ``collision``: contact with bones at every step, by default none. ``time_step``: the longest, by default a stable step.
+    single small mass would make every time step small. ``frame_time``: the solver's time between successive frame numbers, in place
+    of the scene's interval; the longer it is, the nearer the muscle is to equilibrium. ``damping``: the coefficient c, or
+    ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an acceleration, by default none. ``collision``: contact with
+    bones at every step, by default none. ``time_step``: the maximum, by default 0.9 of the stable time step.
     """
 
     stiffness: Stiffness
@@ -96,9 +96,9 @@ def stable_time_step(network: Network, fixed: Ints) -> float:
     """The time step [s] below which eqs 5.6 and 5.7 are stable, for any shape.
 
     A mode of the free masses is stable if ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions), with k its stiffness. At mass i with
-    n_i springs, stretched or not, k is at most ``2 n_i`` times the stiffness of a spring; the least limit of all masses counts. The
-    positive root is ``4 m / (c + sqrt(c^2 + 4 k m))``, a form without cancellation. For c = 0 it is 2 / omega with omega^2 = 2 n k
-    / m, the exact limit of two masses on one spring.
+    n_i springs, stretched or not, k is at most ``2 n_i`` times the stiffness of a spring; the smallest limit of all masses counts.
+    The positive root is ``4 m / (c + sqrt(c^2 + 4 k m))``, a form without cancellation. For c = 0 it is 2 / omega with
+    omega^2 = k / m, the exact limit of two masses on one spring.
     """
     springs = network.stiffness * np.bincount(network.springs.ravel(), minlength=len(network.masses))
     c = network.damping
@@ -107,8 +107,8 @@ def stable_time_step(network: Network, fixed: Ints) -> float:
 
 
 class MassSpringModel:
-    """A muscle as masses and springs, advanced by frame numbers: its ``network``, the ``fixed`` masses (k,), and the bones with
-    which the other masses collide. Masses are at ``points`` (n, 3) [mm]; one step earlier they were at ``previous``.
+    """A muscle as masses and springs, advanced from each frame number to the next: its ``network``, the ``fixed`` masses (k,), and
+    the bones with which the other masses collide. Masses are at ``points`` (n, 3) [mm]; one step earlier they were at ``previous``.
     """
 
     def __init__(self, problem: MuscleProblem, settings: MassSpringSettings) -> None:
@@ -158,13 +158,13 @@ class MassSpringModel:
         return points
 
     def trouble(self) -> Trouble | None:
-        """The trouble with the boundary of the tetrahedra; None if there is none."""
+        """The trouble with the boundary surface of the mesh; None if there is none."""
         return self.check.trouble(self.points)
 
     def frame(self, number: int) -> Frame:
-        """Surface and fibres as the masses carry them; attached vertices move with their bones.
+        """Surface and fibres, interpolated from the masses; attached vertices move with their bones.
 
-        Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and the number ``inverted_tets``.
+        Scalars: ``unbalanced_max`` [N], the maximum force on a free mass, and ``inverted_tets``, the number of inverted tetrahedra.
         """
         given, mesh = self.problem, self.problem.mesh
         moved = self.points - mesh.points

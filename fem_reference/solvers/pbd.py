@@ -3,7 +3,7 @@
 Frame number n is the state after iteration n. In an iteration the bones first take their pose; then every sub-iteration is a full
 step of the algorithm. No external force acts, so the time step cancels and is no setting: instead of velocities, ``dt v``, the
 displacements of vertices in one sub-iteration, are stored. As in the report, the result depends on the order of the vertices, since
-constraints are projected one after the other. Collisions are found anew in every sweep, while line 13 finds them once.
+constraints are projected one after the other. Collisions are found anew in every sweep; the algorithm finds them once, in line 13.
 """
 
 from collections.abc import Sequence
@@ -24,13 +24,13 @@ from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 
 Stiffness = Annotated[float, Field(ge=0, le=1)]
-# Segments count as equally near if their distances differ by less than this share of the size of the muscle.
+# Segments count as equally near if their distances differ by less than this fraction of the size of the muscle.
 _AS_NEAR = 1e-9
 
 
 class PbdCollision(Record):
-    """Contact of bones with free vertices. ``gap`` [mm]: the least distance of a vertex, or its distance at rest if that is less;
-    ``stiffness``: the fraction of the displacement out of a bone that one projection applies.
+    """Contact of bones with free vertices. ``gap`` [mm]: the smallest allowed distance of a vertex, unless its distance at rest is
+    less; ``stiffness``: the fraction of the displacement out of a bone that one projection applies.
     """
 
     gap: Annotated[Length, Field(ge=0)]
@@ -45,8 +45,8 @@ class PbdSettings(Record):
     ``volume``, ``bending``: the stiffness of edge lengths, enclosed volume and dihedral angles, that is, the fraction of an
     error that one projection removes, from 0 (constraint off) to 1.
 
-    ``anisotropy`` a: edges have the stiffness ``stretch (1 - a |cos|)``, with the angle to the nearest fibre at rest; a = 1 in the
-    report's program with fibres. ``collision``: contact with bones (lines 12 to 14).
+    ``anisotropy`` a: an edge has the stiffness ``stretch (1 - a |cos|)``, with the cosine of its angle to the nearest fibre at
+    rest; a = 1 in the report's program with fibres. ``collision``: contact with bones (lines 12 to 14).
     """
 
     sub_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10))]
@@ -103,7 +103,7 @@ class PbdConstraints:
 
 
 def hinges_of(triangles: Ints) -> Ints:
-    """Each edge of a closed surface once, in the order of its vertices: its ends, the vertices opposite it; (e, 4)."""
+    """The hinges (e, 4), one for each edge of a closed surface, sorted by vertices: both ends, and the two vertices opposite."""
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     opposite = triangles[:, [2, 0, 1]].ravel()
     order = np.lexsort((edges[:, 1], edges[:, 0]))
@@ -111,8 +111,8 @@ def hinges_of(triangles: Ints) -> Ints:
 
 
 def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
-    """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre at the point nearest to its middle. If two
-    segments are equally near up to rounding, as at a kink, the first counts, even if the scene is rotated.
+    """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre segment nearest to the middle of the edge. Of
+    segments that are equally near up to rounding, as at a kink, the first counts; so a rotated scene gives the same choice.
     """
     starts = np.setdiff1d(np.arange(len(fibres.points) - 1), fibres.offsets[1:] - 1)
     starts = starts[np.any(fibres.points[starts + 1] != fibres.points[starts], axis=1)]

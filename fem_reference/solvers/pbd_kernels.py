@@ -7,8 +7,8 @@ order. Arrays should be writable and C-contiguous: the loops are compiled again 
 
 In extended position based dynamics (``pull_``; Macklin, Mueller and Chentanez 2016, DOI 10.1145/2994258.2994272) C stands for the
 energy ``C^2 / (2 alpha)`` with a compliance alpha. A projection moves points by ``dp_i = w_i grad_i C dl``, ``dl = -(C + a l) /
-(sum_j w_j |grad_j C|^2 + a)`` with w in 1/t and ``a = alpha / dt^2`` (their eq. 18), and adds dl to the multiplier l, which begins
-a time step as 0: ``l / dt^2`` is the constraint's force. The path to the solution depends on the order; the solution does not.
+(sum_j w_j |grad_j C|^2 + a)`` with w in 1/t (t: tonne) and ``a = alpha / dt^2`` (their eq. 18), and adds dl to the multiplier l,
+which starts a time step at 0: ``l / dt^2`` is the constraint's force. Only the path to the solution depends on the order.
 """
 
 import math
@@ -23,7 +23,7 @@ Vector = tuple[float, float, float]
 # Below this sine of a dihedral angle its gradient is rounding noise, and the pair counts as flat.
 FLAT = 1e-5
 # One projection turns a pair by at most this angle [rad]. Points move along lines, not arcs, so a turn by t lengthens a triangle by
-# the share t^2 / 2; at pairs that are folded shut (t near pi) this would grow from pair to pair without bound.
+# the fraction t^2 / 2; at pairs that are folded shut (t near pi) this would grow from pair to pair without bound.
 LARGEST_TURN = 0.3
 _ZERO = (0.0, 0.0, 0.0)
 
@@ -67,7 +67,7 @@ def move(points: Floats, i: int, factor: float, direction: Vector) -> None:
 
 @compiled
 def distance(p1: Vector, p2: Vector) -> tuple[float, Vector]:
-    """Distance of two points [mm] and its gradient at ``p1``, minus that at ``p2``. Eq. 5.15-5.17.
+    """Distance of two points [mm] and its gradient at ``p1``; at ``p2`` it has the opposite sign. Eq. 5.15-5.17.
 
     The gradient is zero if the points coincide.
     """
@@ -80,7 +80,7 @@ def distance(p1: Vector, p2: Vector) -> tuple[float, Vector]:
 def volume(points: Floats, triangles: Ints) -> tuple[float, Floats]:
     """Six times the volume inside closed ``triangles`` (m, 3) [mm3] and its gradient (n, 3) [mm2]. Eq. 5.19-5.21.
 
-    Eq. 5.18 drops its 1/6 halfway; here value and gradient both lack it. The origin is the mean of the points: this does not
+    Eq. 5.18 drops its 1/6 halfway; here neither value nor gradient has it. The origin is the mean of the points: this does not
     change the volume of a closed surface, and reduces rounding.
     """
     centre = (points[:, 0].mean(), points[:, 1].mean(), points[:, 2].mean())
@@ -101,9 +101,9 @@ def volume(points: Floats, triangles: Ints) -> tuple[float, Floats]:
 def dihedral(p1: Vector, p2: Vector, p3: Vector, p4: Vector) -> tuple[float, Vector, Vector, Vector, Vector]:
     """Angle [rad] of triangles (p1, p2, p3) and (p1, p2, p4) about their edge p1-p2, and its gradients. Eq. 5.22-5.30.
 
-    The angle is pi for a flat pair, and is the same on the two sides of a fold. Gradients are zero if arccos has none: flat, folded
-    shut, no area. As arccos d loses half its digits there, it is computed as atan2(sine, d). Eq. 5.26 needs eq. 5.30 transposed,
-    and its ``n2 . (n2 x p2)`` is an outer product.
+    The angle is pi for a flat pair, and does not distinguish the two senses of a fold. Gradients are zero where arccos has none: in
+    pairs that are flat, folded shut or without area. There arccos d loses half its digits, so the angle is computed as
+    atan2(sine, d). Eq. 5.26 needs eq. 5.30 transposed, and its ``n2 . (n2 x p2)`` is an outer product.
     """
     e, a, b = minus(p2, p1), minus(p3, p1), minus(p4, p1)
     u1, u2 = cross(e, a), cross(e, b)
@@ -136,7 +136,7 @@ def distances(points: Floats, edges: Ints) -> Floats:
 
 @compiled
 def dihedrals(points: Floats, hinges: Ints) -> Floats:
-    """Angle [rad] of each of the ``hinges`` (e, 4): both ends of an edge, and the vertices opposite it."""
+    """Angle [rad] of each of the ``hinges`` (e, 4): both ends of an edge, and the two vertices opposite."""
     found = np.empty(len(hinges))
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
@@ -146,7 +146,7 @@ def dihedrals(points: Floats, hinges: Ints) -> Floats:
 
 @compiled
 def project_distances(points: Floats, inverse_masses: Floats, edges: Ints, rest: Floats, stiffness: Floats) -> None:
-    """Move the ends of each of the ``edges`` (e, 2) towards their distance ``rest`` (e,) [mm], by their ``stiffness`` (e,)."""
+    """Move the ends of each of the ``edges`` (e, 2) towards its length ``rest`` (e,) [mm], with its ``stiffness`` (e,)."""
     for h in range(len(edges)):
         i, j = edges[h, 0], edges[h, 1]
         weight = inverse_masses[i] + inverse_masses[j]
@@ -159,7 +159,7 @@ def project_distances(points: Floats, inverse_masses: Floats, edges: Ints, rest:
 
 @compiled
 def to_segment(p: Vector, start: Vector, end: Vector) -> float:
-    """Distance of a point [mm] from the segment between ``start`` and ``end``, which are apart."""
+    """Distance of the point ``p`` [mm] from the segment between ``start`` and ``end``, which must differ."""
     segment, off = minus(end, start), minus(p, start)
     share = min(1.0, max(0.0, dot(off, segment) / max(dot(segment, segment), 1e-300)))
     return distance(off, times(share, segment))[0]
@@ -167,7 +167,7 @@ def to_segment(p: Vector, start: Vector, end: Vector) -> float:
 
 @compiled
 def nearest_segments(points: Floats, starts: Floats, ends: Floats, within: float) -> Ints:
-    """The segment (n,) nearest to each of ``points`` (n, 3), the first of those ``within`` [mm] of the least distance.
+    """The segment (n,) nearest to each of ``points`` (n, 3): the first of those ``within`` [mm] of the minimum distance.
 
     Segments go from ``starts`` (k, 3) to ``ends`` (k, 3) [mm].
     """
@@ -183,7 +183,7 @@ def nearest_segments(points: Floats, starts: Floats, ends: Floats, within: float
 
 @compiled
 def project_volume(points: Floats, inverse_masses: Floats, triangles: Ints, rest: float, stiffness: float) -> None:
-    """Move every point along the volume's gradient, towards six times a volume of ``rest`` [mm3]."""
+    """Move every point along the gradient of six times the volume, towards its value ``rest`` [mm3]."""
     value, gradient = volume(points, triangles)
     weight = 0.0
     for i in range(len(points)):
@@ -197,7 +197,7 @@ def project_volume(points: Floats, inverse_masses: Floats, triangles: Ints, rest
 
 @compiled
 def project_dihedrals(points: Floats, inverse_masses: Floats, hinges: Ints, rest: Floats, stiffness: float) -> None:
-    """Move the vertices of each of the ``hinges`` (e, 4) towards their angle ``rest`` (e,) [rad]."""
+    """Move the vertices of each of the ``hinges`` (e, 4) towards its angle ``rest`` (e,) [rad]."""
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
         angle, g1, g2, g3, g4 = dihedral(at(points, i), at(points, j), at(points, k), at(points, m))
@@ -213,7 +213,7 @@ def project_dihedrals(points: Floats, inverse_masses: Floats, hinges: Ints, rest
 
 @compiled
 def multiplier_step(value: float, weight: float, softness: float, multiplier: float) -> float:
-    """``dl`` of a constraint of this ``value``; 0 if nothing could move."""
+    """``dl`` of a constraint with this ``value``; 0 if none of its points can move."""
     if weight > 0:
         return -(value + softness * multiplier) / (weight + softness)
     return 0.0
@@ -223,7 +223,7 @@ def multiplier_step(value: float, weight: float, softness: float, multiplier: fl
 def pull_distances(
     points: Floats, inverse_masses: Floats, edges: Ints, rest: Floats, softness: Floats, multipliers: Floats
 ) -> None:
-    """One projection of the length of each of the ``edges`` (e, 2), ``rest`` (e,) [mm] at rest; ``softness`` a (e,) [1/t]."""
+    """Project the length of each of the ``edges`` (e, 2) once, ``rest`` (e,) [mm] at rest; ``softness`` a (e,) [1/t]."""
     for h in range(len(edges)):
         i, j = edges[h, 0], edges[h, 1]
         length, direction = distance(at(points, i), at(points, j))
@@ -238,9 +238,9 @@ def pull_distances(
 def pull_volume(
     points: Floats, inverse_masses: Floats, triangles: Ints, rest: float, softness: float, multiplier: float
 ) -> float:
-    """One projection of six times the volume inside ``triangles`` (m, 3), ``rest`` [mm3] at rest; ``softness`` a [mm4/t].
+    """Project six times the volume inside ``triangles`` (m, 3) once, ``rest`` [mm3] at rest; ``softness`` a [mm4/t].
 
-    Returns the multiplier after it.
+    Returns the new multiplier.
     """
     value, gradient = volume(points, triangles)
     weight = 0.0
@@ -257,7 +257,7 @@ def pull_volume(
 def pull_dihedrals(
     points: Floats, inverse_masses: Floats, hinges: Ints, rest: Floats, softness: Floats, multipliers: Floats
 ) -> None:
-    """One projection of the angle of each of the ``hinges`` (e, 4), ``rest`` (e,) [rad] at rest; ``softness`` a (e,) [1/(t mm2)].
+    """Project the angle of each of the ``hinges`` (e, 4) once, ``rest`` (e,) [rad] at rest; ``softness`` a (e,) [1/(t mm2)].
 
     As in position based dynamics, no projection turns a pair by more than ``LARGEST_TURN``.
     """

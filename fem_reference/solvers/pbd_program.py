@@ -8,24 +8,24 @@ The program (github.com/cervenkam/muscle-deformation-PBD) differs from the repor
 - volume: its change is divided by 6 but its gradient is not, which removes a sixth of the error in a step (text:
   eq. 5.18 to 5.21 drop the 6 in both)
 - folds: opened if they are sharper than at rest, never closed, and not changed if they are nearly flat or the correction would be
-  small or very great (text: eq. 5.22 keeps every angle)
+  small or very large (text: eq. 5.22 keeps every angle)
 - one sweep over the constraints in each step; only then are collisions found (text: many sweeps, line 15; found first,
   line 13)
 - time: each step of an iteration lasts as long as all steps together should (text: section 6.1 divides it), but without forces time
   cancels
 - collisions: of vertices with voxels (text: section 6.1.1 has triangles), in the bone's frame at rest. Voxels that a flood fill
   from one corner does not reach are inside. A vertex that was inside before moves by the bone's last motion, step after step, even
-  after the bone has come to rest; a vertex that enters is moved back by steps of a voxel; of two bones the later takes precedence.
-  Voxels lie along the axes at rest, and one voxel decides where a vertex goes: if the scene is rotated, vertices of the case
-  hip_flexion differ by up to 57 mm (mean 4.5 mm; without voxels 1e-8 mm)
+  after the bone has come to rest; a vertex that enters is moved back in steps of one voxel; if two bones move a vertex, the later
+  bone takes precedence. Voxels are aligned with the axes at rest, and a single voxel decides where a vertex goes: if the scene is
+  rotated, vertices of the case hip_flexion differ by up to 57 mm (mean 4.5 mm; without voxels 1e-8 mm)
 
 Frame number n is the state after iteration n.
 
-The recorded box is reproduced in all 300 iterations, to the last digit of its single precision. This requires the program's order
-of arithmetic, so no projection of a constraint is shared with ``pbd``: the squeezed box is chaotic, and a difference of 1e-15 at
-rest, or between two orders, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with its own flags, among them
--Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by iteration 50). For the same
-reason a bone's pose is the product of its motions here, and the angle of flat pairs at rest has an error of 2e-8 rad.
+The recorded squeezed box is reproduced in all 300 iterations, to the last digit of its single precision. This requires the order
+of arithmetic of the program, so no projection is shared with ``pbd``: the squeezed box is chaotic, and a difference of 1e-15, at
+rest or from the order of a sum, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with its own flags, among
+them -Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by iteration 50). For the
+same reason a bone's pose is the product of its motions, and the rest angle of flat pairs has an error of 2e-8 rad.
 
 Two things differ from the program: the scene defines the attached vertices (in the program, all vertices in the voxels of a bone at
 rest), and a fibre's direction follows its own points (in the program, points of several fibres).
@@ -52,7 +52,7 @@ from fem_reference.solvers.pbd_kernels import distances
 
 # The time step [s]; it cancels, up to rounding.
 STEP = 1e-3
-# Decimal places of the motion between two poses, so that 90 mm in 100 iterations are exactly 0.9 mm in each.
+# Decimal places to which the motion between two poses is rounded, so that 90 mm in 100 iterations is exactly 0.9 mm in each.
 DIGITS = 12
 
 
@@ -62,8 +62,8 @@ class ProgramSettings(Record):
     ``sub_iterations``: steps in each iteration, 3 in section 6.1 of the report. ``damping``: the fraction of every velocity that
     is lost in a step, 0.01 in the program. ``bending``: a factor on the correction of a dihedral angle, 0.9 in the program.
     ``voxels``: their number along each side of a bone's bounding box, 64 in the program; without this key there is no contact.
-    ``anisotropy`` a: the stiffness of an edge is (1 - |cos|)^a, with its angle to the nearest fibre, and a = 1 in the program;
-    without this key the stiffness is 1, as in the program without fibres.
+    ``anisotropy`` a: the stiffness of an edge is (1 - |cos|)^a, with the cosine of its angle to the nearest fibre; a = 1 in the
+    program. Without this key the stiffness is 1, as in the program without fibres.
     """
 
     sub_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10))]
@@ -75,7 +75,7 @@ class ProgramSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class Voxels:
-    """A box of k^3 voxels: a mask (k, k, k) of voxels ``inside`` a bone, its ``lower`` corner (3,) and their ``size`` (3,) [mm]."""
+    """A box of k^3 voxels: the mask ``inside`` (k, k, k) of a bone, the ``lower`` corner (3,), and a voxel's ``size`` (3,) [mm]."""
 
     inside: NDArray[np.bool_]
     lower: Floats
@@ -137,9 +137,9 @@ def half_edges_of(triangles: Ints) -> Ints:
 
 
 def hinges_of(points: Floats, triangles: Ints) -> tuple[Ints, Floats]:
-    """Each edge of a closed surface once, in the order of the later of its triangles, and the angle [rad] of the two triangles.
+    """The hinges (e, 4) of a closed surface and their angles (e,) [rad], one per edge, in the order of its later triangle.
 
-    (e, 4): its ends, the vertices opposite it in the earlier and in the later triangle; (e,).
+    A hinge: both ends of the edge, then the vertices opposite the edge in the earlier and in the later of its triangles.
     """
     opposite, starts, ends = (np.roll(triangles, -corner, axis=1).ravel() for corner in range(3))
     sides = np.lexsort((np.maximum(starts, ends), np.minimum(starts, ends))).reshape(-1, 2)

@@ -2,7 +2,7 @@
 
 The code follows the program's source. As the result is chaotic, the last digit matters: each sum has the order that gcc 12 produces
 with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than SSE2), as
-found in the machine code. Do not simplify the sums. Arrays that are not writable and C-contiguous are compiled separately.
+found in the machine code. Do not simplify the sums. For arrays that are not writable and C-contiguous, loops are compiled again.
 """
 
 import math
@@ -13,11 +13,11 @@ from fem_reference.foundations.mesh import Bools, Floats, Ints
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import Vector, at, cross, dot, minus, move, times
 
-# Pairs of triangles whose normals have a cosine of greater magnitude than this are not changed.
+# A pair of triangles is not changed if the cosine of the angle between their normals exceeds this in magnitude.
 FLAT_COSINE = 1 - 1e-10
 # A fold is corrected only if the ratio of the correction to its gradient is in this range.
 SMALLEST_RATIO, GREATEST_RATIO = 0.1, 10.0
-# The squares of the gradients of a fold are taken to be at least this [1/mm2].
+# The sum of the squared gradients of a fold is taken to be at least this [1/mm2].
 SMALLEST_WEIGHT = 1e-4
 # The diagonal of a voxel as the program computes it, in voxels.
 DIAGONAL = math.sqrt(3) + 1e-3
@@ -37,7 +37,7 @@ def add_dot(total: float, a: Vector, b: Vector) -> float:
 
 @compiled
 def project_edges(points: Floats, edges: Ints, rest: Floats, stiffness: Floats) -> None:
-    """Move both ends of each of the ``edges`` (e, 2) towards their distance ``rest`` (e,) [mm], by their ``stiffness`` (e,)."""
+    """Move the ends of each of the ``edges`` (e, 2) towards its length ``rest`` (e,) [mm], with its ``stiffness`` (e,)."""
     for h in range(len(edges)):
         i, j = edges[h, 0], edges[h, 1]
         apart = minus(at(points, i), at(points, j))
@@ -63,7 +63,7 @@ def six_volumes(points: Floats, triangles: Ints) -> tuple[float, Floats]:
 
 @compiled
 def project_volume(points: Floats, triangles: Ints, rest: float) -> None:
-    """Move every point along the gradient of six volumes, towards ``rest`` [mm3], by a sixth of the missing volume."""
+    """Move every point along the gradient of six times the volume, towards its ``rest`` [mm3]; a sixth of the error is removed."""
     value, gradient = six_volumes(points, triangles)
     weight = 0.0
     for i in range(len(points)):
@@ -96,7 +96,7 @@ def angles_of(normals: Floats, pairs: Ints) -> Floats:
 
 @compiled
 def _turn(point: Vector, other: Vector, own: Vector, cosine: float) -> Vector:
-    """``point x other + cosine own x point``, a term of the gradients of the cosine of two unit normals (Mueller 2007)."""
+    """``point x other + cosine own x point``, a term in the gradients of the cosine between two unit normals (Mueller 2007)."""
     return plus(cross(point, other), times(cosine, cross(own, point)))
 
 
@@ -132,9 +132,9 @@ def _squares(q1: Vector, q2: Vector, q3: Vector, q4: Vector) -> float:
 
 @compiled
 def project_folds(points: Floats, hinges: Ints, rest: Floats, factor: float) -> None:
-    """Open each of the ``hinges`` (h, 4) that is folded more sharply than its angle ``rest`` (h,) [rad], by Mueller 2007.
+    """Open each of the ``hinges`` (h, 4) that is folded more sharply than its angle ``rest`` (h,) [rad], as in Mueller 2007.
 
-    With q minus the gradients of the cosine, the points move by ``ratio q``; a fold with too small or too great a ratio stays.
+    Points move by ``ratio`` times the negative gradient of the cosine; a fold whose ratio is too small or too large stays.
     """
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
@@ -201,7 +201,7 @@ def mark(border: Bools, points: Floats, places: Floats, triangles: Ints) -> None
 
 @compiled
 def flood(border: Bools) -> Bools:
-    """The voxels (k, k, k) reached by a flood from (0, 0, 0), through faces, not into the ``border`` or back to an index of 0."""
+    """The voxels (k, k, k) reached by a flood from (0, 0, 0) through faces, without the ``border`` or a return to an index of 0."""
     outside = np.zeros(border.shape, np.bool_)
     found = np.zeros((border.size, 3), np.int64)
     outside[0, 0, 0] = not border[0, 0, 0]

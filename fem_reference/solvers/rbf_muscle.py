@@ -34,7 +34,7 @@ from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd_kernels import volume
 
-# The number of neighbours of a node, and of nodes of an attachment.
+# The number of neighbours of a node, and the number of nodes in an attachment.
 _AROUND, _HANDLES = 8, 12
 # The number of rounds in which centres are pushed out of bones, and in which radii are scaled.
 _PUSHES, _SCALINGS = 4, 3
@@ -53,8 +53,8 @@ class RbfSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
-    """Nodes (k, 3) that stay as rigid as possible among their neighbours in ``cells``: first the ``free`` centres, then the points
-    of attachments, which are given. ``system``: the global step.
+    """Nodes (k, 3) that move as rigidly as possible with their neighbours in ``cells``: first the ``free`` centres (their number),
+    then the points of attachments, whose positions are given. ``system``: the global step.
     """
 
     nodes: Floats
@@ -80,7 +80,7 @@ class Cloud:
         return Cloud(nodes, free, cells, system)
 
     def gradients(self, now: Floats) -> Floats:
-        """Sums (k, 3, 3) of the products of present edges and edges at rest, around each node."""
+        """The sum (k, 3, 3) over the edges at each node of the outer product of the present edge and the edge at rest."""
         one, other = np.repeat(np.arange(len(now)), np.diff(self.cells.starts)), self.cells.neighbours
         found = np.zeros((len(now), 3, 3))
         np.add.at(found, one, (now[one] - now[other])[:, :, None] * (self.nodes[one] - self.nodes[other])[:, None])
@@ -105,7 +105,7 @@ class Cloud:
 
 
 class RbfMuscle(MovingSurface):
-    """The muscle, moved from frame to frame."""
+    """The muscle, moved from each frame number to the next."""
 
     advice = "a slower motion, more iterations, or contact = false, may help"
 
@@ -128,7 +128,7 @@ class RbfMuscle(MovingSurface):
         self.cloud.relax(self.nodes, 1)  # compiles the code here, outside the time of the first frame
 
     def move(self, number: int) -> None:
-        """Find the muscle at a frame."""
+        """Move the muscle to frame ``number``."""
         count, setup, rest = self.cloud.free, self.setup, self.fitted
         poses = zip(setup.attached, self.handles, strict=True)
         given = [apply(entry.bone.pose(number), setup.surface.points[handles]) for entry, handles in poses]
@@ -168,7 +168,7 @@ class RbfMuscle(MovingSurface):
             points += self.beside[:, None] * (bony - points)[self.nearest]
             carry(points, self.setup, number)  # exactly, even if the surface of the Gaussians is far away
             scale *= float(np.cbrt(self.volume / enclosed_volume(points, self.setup.surface.triangles)))
-        if self.settings.volume:  # free vertices correct the remaining error along its gradient
+        if self.settings.volume:  # free vertices correct the remaining error, along the gradient of the volume
             six, gradient = volume(points, self.setup.surface.triangles)
             gradient[self.setup.attached_vertices] = 0
             points += gradient * (6 * self.volume - six) / float((gradient**2).sum())
@@ -182,7 +182,7 @@ class RbfMuscle(MovingSurface):
 
 
 def solve(setup: Setup, settings: RbfSettings, sink: Sink) -> Outcome:
-    """Find the muscle at every frame number."""
+    """Compute the muscle at every frame number."""
     if not setup.attached:
         raise InputError("rbf_muscle", "a muscle without attachments", "attachments whose bones move it")
     return follow(RbfMuscle(setup, settings), setup, sink)

@@ -26,16 +26,16 @@ from fem_reference.solvers.common.protocol import MuscleSolver
 
 log = logging.getLogger(__name__)
 
-# Greatest distance [mm] (rms) of the first frame from the rest surface without a warning: above the rounding of any format.
+# Maximum distance [mm] (rms) of the first frame from the rest surface without a warning: above the rounding of any format.
 AT_REST = 0.1
-# Greatest allowed distance, in diagonals of the rest surface's bounding box: above the change by solvers in their first frame,
-# below the change by a wrong unit (at a tenth of the size, points are at least 0.9 rms radii away, 0.26 diagonals for a sphere).
+# Maximum allowed distance, in diagonals of the rest surface's bounding box: more than solvers move points in their first frame,
+# less than a wrong unit does (at a tenth of the size, points are at least 0.9 rms radii away, 0.26 diagonals for a sphere).
 NEAR_REST = 0.05
-# The least size of a frame, relative to rest: no solver shrinks a body below it, but a frame in m has 1/1000 of the size in mm.
+# The minimum size of a frame relative to rest: no solver shrinks a body so far, but a frame in m has 1/1000 of the size in mm.
 SMALLEST = 1 / 50
-# Greatest distance [mm] between corners of an STL file that count as one vertex: three times the spacing of float32 at 500 mm.
+# Maximum distance [mm] between corners of an STL file that count as one vertex: three times the spacing of float32 at 500 mm.
 SAME_POINT = 1e-4
-# Greatest distance of a time from the time of its frame, in frames: above rounding to four digits, and far below half a frame.
+# Maximum distance of a time from the time of its frame, in frames: above rounding to four digits, and far below half a frame.
 ON_FRAME = 1e-3
 
 _INDICES = (".pvd", ".xdmf")
@@ -90,8 +90,8 @@ def about(path: Path) -> About:
 
 
 def choice(path: Path, unit: str | None = None, place: str = "folder") -> Candidate:
-    """The recorded frames in the folder or file at ``path`` as a candidate, with the name and, without a ``unit``, the unit in
-    their ``candidate.toml``; ``place`` names the path in messages.
+    """The recorded frames in the folder or file at ``path`` as a candidate. Its name and, if no ``unit`` is given, its unit are
+    from the ``candidate.toml`` of the frames; ``place`` names the path in messages.
     """
     if not path.exists() or not path.parts:
         raise InputError(place, f'"{path}"', "a folder of frames")
@@ -114,7 +114,7 @@ def origin(settings: RecordedSettings) -> dict[str, Any]:
 
 
 def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
-    """Pass on every requested frame, once all are read and checked to be of this surface; the cost is from ``candidate.toml``."""
+    """Pass every requested frame to ``sink``, after all are read and checked; the cost is from ``candidate.toml``."""
     folder = Path(settings.folder)
     said = checked_about(folder, settings.unit)
     frames = list(checked_frames(setup, folder, settings.unit))
@@ -126,10 +126,10 @@ def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
 
 
 def checked_frames(setup: Setup, folder: Path, unit: float) -> Iterator[Frame]:
-    """The requested frames, one after the other, from the sequence in a ``folder``, in a ``unit`` [mm]; InputError at the first
-    frame that is missing or not of this surface.
+    """The requested frames, one after the other, of the sequence in a ``folder``, with lengths in units of ``unit`` [mm];
+    InputError at the first frame that is missing or not of this surface.
 
-    The times of an index are times of frames by ``setup.interval`` [s], or frame numbers if the interval is None.
+    The times in an index file are multiples of ``setup.interval`` [s], or frame numbers if the interval is None.
     """
     source = _source(folder)
     sequence = _sequence(source, unit, setup.interval)
@@ -152,7 +152,7 @@ def checked_frames(setup: Setup, folder: Path, unit: float) -> Iterator[Frame]:
 
 
 def checked_about(folder: Path, unit: float | None) -> About:
-    """The ``candidate.toml`` of the sequence; InputError if its unit differs from ``unit`` [mm], or a file from its hash."""
+    """The ``candidate.toml`` of the sequence; InputError if its unit is not ``unit`` [mm] or a file does not match its hash."""
     said = about(folder)
     if said.unit is not None and unit is not None and length_unit(said.unit) != unit:
         place = f"{_about_file(folder)}: unit"
@@ -161,12 +161,12 @@ def checked_about(folder: Path, unit: float | None) -> About:
         file = _about_file(folder).with_name(name)
         got = hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else "no file"
         if got != wanted:
-            raise InputError(f"{_about_file(folder)}: sha256.{name}", f"{got} of the file", wanted)
+            raise InputError(f"{_about_file(folder)}: sha256.{name}", got, wanted)
     return said
 
 
 def _source(path: Path) -> Path:
-    """The folder of mesh files or the index file that ``path`` leads to."""
+    """The folder of mesh files, or the index file, at ``path``."""
     if (path / "run.json").is_file():
         return path / "surface"
     if path.is_dir():
@@ -243,13 +243,13 @@ def _strangers(triangles: Ints, rest: Ints) -> NDArray[np.bool_]:
 
 
 def _turned(triangles: Ints) -> Ints:
-    """Each triangle beginning with its smallest vertex, its orientation kept."""
+    """Each triangle written from its smallest vertex, with the same orientation."""
     corners = (triangles.argmin(axis=1)[:, None] + np.arange(3)) % 3
     return np.take_along_axis(triangles, corners, axis=1)
 
 
 def _welded(soup: Surface, rest: Surface) -> Floats:
-    """Points (n, 3) [mm] of the vertices of ``rest`` from triangles without shared vertices, in the order of its triangles."""
+    """Points (n, 3) [mm] for the vertices of ``rest``, from the same triangles in the same order but without shared vertices."""
     points, found = np.full(rest.points.shape, np.nan), []
     for vertices in (rest.triangles.ravel(), rest.triangles[:, ::-1].ravel()):
         points[vertices] = soup.points

@@ -26,7 +26,7 @@ class Network(NamedTuple):
 
 
 class PrescribedPath(NamedTuple):
-    """Masses ``fixed`` (h,) that move at constant velocity from their positions ``before`` to those ``after``, (h, 3) [mm]."""
+    """The ``fixed`` masses (h,), which move at constant velocity from their positions ``before`` to those ``after`` (h, 3) [mm]."""
 
     fixed: Ints
     before: Floats
@@ -35,7 +35,7 @@ class PrescribedPath(NamedTuple):
 
 @compiled
 def forces(points: Floats, network: Network) -> Floats:
-    """The forces (n, 3) [N] on each mass, without damping: its weight and the forces of its springs.
+    """The force (n, 3) [N] on each mass, without damping: its weight plus the forces of its springs.
 
     A spring from mass i pulls with ``k (l - L) (x_j - x_i) / l``: F_ij of eq. 5.3 is minus this force, since eq. 5.4 has it on the
     left. If both ends coincide the spring has no direction and does not pull.
@@ -63,7 +63,7 @@ def forces(points: Floats, network: Network) -> Floats:
 def advance(
     points: Floats, previous: Floats, network: Network, path: PrescribedPath, time_step: float, steps: int
 ) -> None:
-    """Move ``points`` (n, 3) [mm] in place through ``steps`` of ``time_step`` [s]; ``previous`` (n, 3): one step before.
+    """Move ``points`` (n, 3) [mm] in place through ``steps`` of ``time_step`` [s]; ``previous`` (n, 3): positions one step before.
 
     Position Verlet with the velocity of the step before, eqs 5.6 and 5.7:
     ``x(t + dt) = 2 x(t) - x(t - dt) + dt^2 / m (F(t) - c (x(t) - x(t - dt)) / dt)``.

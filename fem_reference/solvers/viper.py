@@ -1,13 +1,13 @@
-"""VIPER: a muscle as a bundle of rods with volume, bends and twist, by position based dynamics.
+"""VIPER: a muscle as a bundle of rods that have volume, bend and twist, by position based dynamics.
 
-Angles et al. (2019), doi:10.1145/3340260: a rod has points with a radius each and segments with a frame each; it resists stretch
-and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep their volume by the radii, which shrink where the
-rod is stretched. The rods of a bundle are tied by shape matching with a scale, which also scales the radii, and carry the surface.
+Angles et al. (2019), doi:10.1145/3340260: a rod has points, each with a radius, and segments, each with a frame. It resists stretch
+and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep their volume: the radii shrink where the rod is
+stretched. Shape matching ties the rods of a bundle; its scale also scales the radii. The surface moves with the rods.
 
-Each fibre of the case is a rod. The bones nearest to its ends act on bend and twist like neighbouring segments. There is neither
-mass nor time: a frame number begins with the previous state, moved by a blend of the bones. Stiffnesses are shares of an error, as
-in ``pbd``, so the result depends on iterations. All rods have the same radius at rest, chosen so that they fill the muscle's
-volume. Only rods keep their volume; the volume inside the surface that they carry may change.
+Each fibre of the case is a rod. For bend and twist, the bones nearest to its ends act like neighbouring segments. There is neither
+mass nor time: a frame number begins with the previous state, moved by a blend of the bones' motions. A stiffness is a factor on the
+corrections of a sweep, as in ``pbd``, so the result depends on ``iterations``. All rods have the same radius at rest, chosen so
+that they fill the muscle's volume. Only rods keep their volume; the volume inside the surface may change.
 """
 
 from typing import Annotated
@@ -30,14 +30,14 @@ from fem_reference.solvers.common.lines import along, nearest_bones
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import Stiffness
 
-# The number of neighbours of a rod in its bundle, and of points of rods that carry a vertex.
+# The number of neighbours of a rod in its bundle, and the number of rod points with which a vertex moves.
 _AROUND, _CARRIERS = 6, 12
 
 
 class ViperSettings(Record):
-    """``points``: their number in each rod. ``iterations``: sweeps over all constraints for each frame number. ``stretch``,
-    ``bending``, ``volume``, ``bundle``: the stiffness of each kind of constraint in a sweep, from 0 (off) to 1. ``contact``: rods
-    keep a distance of at least their radius from bones, or that at rest if less; the surface is moved out of bones. Default: off.
+    """``points``: the number per rod. ``iterations``: sweeps over all constraints for each frame number. ``stretch``, ``bending``,
+    ``volume``, ``bundle``: the stiffness of each kind of constraint in a sweep, from 0 (off) to 1. ``contact`` (default off): rods
+    keep at least their radius, or the distance at rest if less, away from bones, and the surface is moved out of bones.
     """
 
     points: Annotated[int, Field(ge=4, le=1000), Trade((4, 6, 12))]
@@ -50,10 +50,10 @@ class ViperSettings(Record):
 
 
 class Bundle:
-    """Rods at ``rest`` (k, p, 3) [mm] of one ``radius``, where points of a section, one of each rod, are tied to those around them.
+    """Rods at ``rest`` (k, p, 3) [mm] of one ``radius``. A section has one point of each rod; neighbours in it form groups.
 
-    Each point and its neighbours move by a rotation and a scale, found by least squares from points, radii and frames; the goal of
-    a point is the mean over its groups.
+    Each group, a point and its neighbours, has a rotation and a scale, fitted to points, radii and frames by least squares; the
+    goal of a point is the mean over its groups.
     """
 
     def __init__(self, rest: Floats, radius: float) -> None:
@@ -66,7 +66,7 @@ class Bundle:
         self.sizes = sizes[..., 0] - np.sum(self.means**2, axis=2)
 
     def goals(self, points: Floats, radii: Floats, frames: Floats) -> tuple[Floats, Floats]:
-        """The target points (k, p, 3) and radii (k, p) [mm], from the present ones with ``frames`` (k, p, 3, 3)."""
+        """The goals (k, p, 3) of ``points`` and (k, p) of ``radii`` [mm], for the present ``frames`` (k, p, 3, 3)."""
         now = (points - self.middle).swapaxes(0, 1)
         parts = now[..., None] * self.sections[..., None, :]
         parts += (self.radius * radii.T)[..., None, None] * frames.swapaxes(0, 1)
@@ -84,7 +84,7 @@ class Bundle:
 
 
 class Rods(MovingSurface):
-    """A muscle as ``rods`` (k, p, 3) [mm] that carry its surface."""
+    """A muscle as ``rods`` (k, p, 3) [mm], with which its surface moves."""
 
     advice = "a slower motion, more iterations, or contact = false, may help"
 
@@ -116,7 +116,7 @@ class Rods(MovingSurface):
         self.cost["unknowns"] = float(len(rest) * (4 * free + 3 * (free + 1) + 2))
 
     def move(self, number: int) -> None:
-        """Find the rods at a frame, and the surface and fibres that follow them."""
+        """Move the rods to frame ``number``, and the surface and fibres with them."""
         self._begin(number)
         for bone in (*self.bones, *self.skin_bones):
             bone.move(number)
@@ -136,7 +136,7 @@ class Rods(MovingSurface):
         self.last = number
 
     def _moved(self, ends: Ints, number: int) -> tuple[Floats, Floats]:
-        """Points and turns if each rod had moved with the bone at one of its ends, ``ends`` (k,), since the last frame number."""
+        """Points and turns of rods that move from the last frame number with the bones at one of their ends, ``ends`` (k,)."""
         points, turns = np.empty_like(self.rods), np.empty_like(self.turns)
         for n in np.unique(ends):
             bone = self.problem.bones[n]
@@ -173,7 +173,7 @@ class Rods(MovingSurface):
         move_out(self.points, self.skin_bones, 1.0)
 
     def frame(self, number: int) -> Frame:
-        """Surface and fibres; scalars: volume ratios to rest, of all rods and the least and greatest of a segment."""
+        """Surface and fibres; scalars: the minimum and maximum over all segments of the ratio of volume to volume at rest."""
         ratio = kernels.volumes(self.rods, self.radii) / self.volumes
         scalars = {"rod_volume_min": float(ratio.min()), "rod_volume_max": float(ratio.max())}
         return Frame(number, self.points.copy(), self.fibres.copy(), scalars=scalars)
@@ -185,11 +185,11 @@ class Rods(MovingSurface):
 
 
 def shares(points: Floats, carriers: Floats, count: int) -> csr_array:
-    """The shares (n, m) of the ``count`` nearest ``carriers`` (m, 3) in ``points`` (n, 3), zero at the next nearest."""
+    """Weights (n, m) of the ``count`` nearest ``carriers`` (m, 3) at ``points`` (n, 3), which fall to 0 at the next nearest."""
     asked = min(count + 1, len(carriers))
     away, near = (found.reshape(len(points), asked) for found in cKDTree(carriers).query(points, k=asked))
     reach = away[:, -1:] * (1 if asked > count else 2) + np.finfo(float).tiny
-    # If all are equally near, all get the same share.
+    # If all are equally near, all get the same weight.
     weights = (1 - (away / reach) ** 2) ** 2 + 1e-12
     weights /= weights.sum(axis=1, keepdims=True)
     rows = np.repeat(np.arange(len(points)), asked)
@@ -197,7 +197,7 @@ def shares(points: Floats, carriers: Floats, count: int) -> csr_array:
 
 
 def _along_rods(lines: list[Floats], count: int) -> csr_array:
-    """The shares (n, k * count) of points of rods in the points of ``lines``: the two ends of the segment that contains each."""
+    """Weights (n, k * count) of rod points at the points of ``lines``, nonzero for both ends of the segment with the point."""
     shares_of = []
     for line in lines:
         travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
@@ -207,12 +207,12 @@ def _along_rods(lines: list[Floats], count: int) -> csr_array:
 
 
 def _carried(rest: Floats, parts: Floats) -> Floats:
-    """Points at ``rest`` (n, 3) [mm] after linear maps and shifts ``parts`` (n, 12)."""
+    """Points at ``rest`` (n, 3) [mm], each moved by a linear map and a shift: its row of ``parts`` (n, 12)."""
     return np.asarray(np.einsum("nij,nj->ni", parts[:, :9].reshape(-1, 3, 3), rest) + parts[:, 9:])
 
 
 def solve(problem: MuscleProblem, settings: ViperSettings, sink: Sink) -> Outcome:
-    """Find the rods at every frame number."""
+    """Compute the rods at every frame number."""
     return follow(Rods(problem, settings), problem, sink)
 
 

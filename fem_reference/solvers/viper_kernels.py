@@ -1,10 +1,9 @@
 """Rods of position based dynamics: quaternions and the projections of constraints.
 
 k rods of p points each have ``points`` (k, p, 3) and ``radii`` (k, p) [mm], and ``turns`` (k, p + 1, 4): unit quaternions
-(w, x, y, z) that rotate each segment's frame from rest, the first and the last for the two bones. Bones prescribe the end points.
-
-All constraints of a kind are projected at once (Jacobi), each by a share that keeps the sum with its neighbours' steps from
-overshooting. Where constraints contradict each other the limit is the least sum of squares, for any order of points.
+(w, x, y, z) that rotate each segment's frame from rest; the first and last are the rotations of the two bones, which prescribe the
+end points. All constraints of a kind are projected at once (Jacobi), with steps so small that their sum with the steps of
+neighbours does not overshoot. If constraints contradict each other, the limit is the least sum of squares, for any order of points.
 """
 
 import numpy as np
@@ -28,7 +27,7 @@ def pure(vectors: Floats) -> Floats:
 
 
 def conjugate(turns: Floats) -> Floats:
-    """The inverse rotations (..., 4)."""
+    """The inverses (..., 4) of the rotations ``turns``."""
     return np.asarray(turns * [1.0, -1.0, -1.0, -1.0])
 
 
@@ -48,11 +47,11 @@ def matrices(turns: Floats) -> Floats:
 
 
 def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: float) -> None:
-    """Project ``C = (x_b - x_a) / l - turned(u, t)`` of each segment, at ``rest`` (k, p - 1, 3) [mm] l times t.
+    """Project ``C = (x_b - x_a) / l - turned(u, t)`` of each segment, which is ``l t`` at ``rest`` (k, p - 1, 3) [mm].
 
-    Neither stretch nor shear (Kugelstadt and Schoemer 2016): the segment is along its frame and as long as at rest. A frame has
-    the inverse mass 1 / l^2, so nothing depends on the unit of length: the sum over masses and squared slopes is 1 + 1 + 4 times 1
-    / l^2, and 2 more bound the effect of neighbours.
+    Where C is 0 there is neither stretch nor shear (Kugelstadt and Schoemer 2016): the segment has its rest length and the
+    direction of its frame. A frame has the inverse mass 1 / l^2, so nothing depends on the unit of length: the sum of inverse
+    masses times squared slopes is (1 + 1 + 4) / l^2, and another 2 / l^2 bounds the effect of neighbours.
     """
     lengths = np.linalg.norm(rest, axis=2, keepdims=True)
     tangents, u = rest / lengths, turns[:, 1:-1]
@@ -63,9 +62,9 @@ def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: floa
 
 
 def project_bend(turns: Floats, stiffness: float) -> None:
-    """Project ``C = Im(conjugate(u_a) u_b)`` of neighbouring segments, and of outer segments and bones: they bend and twist least.
+    """Project ``C = Im(conjugate(u_a) u_b)``, bend and twist, of neighbouring segments and of the outer segments and bones.
 
-    The Darboux vector of Kugelstadt and Schoemer (2016), with frames at rest taken as parallel: rods curved at rest remain so.
+    C is the Darboux vector of Kugelstadt and Schoemer (2016) if frames at rest are parallel: rods curved at rest remain so.
     """
     a, b, found = turns[:, :-1], turns[:, 1:], np.zeros_like(turns)
     step = pure(-stiffness / 4 * product(conjugate(a), b)[..., 1:])
@@ -76,20 +75,20 @@ def project_bend(turns: Floats, stiffness: float) -> None:
 
 
 def volumes(points: Floats, radii: Floats) -> Floats:
-    """Volumes (k, p - 1) [mm3] of segments as cones, ``pi / 3 l (r_a^2 + r_a r_b + r_b^2)``."""
+    """Volumes (k, p - 1) [mm3] of segments as truncated cones, ``pi / 3 l (r_a^2 + r_a r_b + r_b^2)``."""
     a, b = radii[:, :-1], radii[:, 1:]
     return np.asarray(np.pi / 3 * np.linalg.norm(np.diff(points, axis=1), axis=2) * (a * a + a * b + b * b))
 
 
 def project_volume(points: Floats, radii: Floats, rest: Floats, stiffness: float) -> None:
-    """Project ``C = V / V_0 - 1`` of each segment, whose volumes at ``rest`` are (k, p - 1) [mm3], by radii and points.
+    """Project ``C = V / V_0 - 1`` of each segment by changing ``points`` and ``radii``; ``rest`` V_0 (k, p - 1) [mm3].
 
-    Each point and radius moves by the mean of the steps of its two segments; a radius at an end has one segment.
+    Each point and radius changes by the mean of the steps of its two segments; a radius at an end has one segment.
     """
     steps, a, b = np.diff(points, axis=1), radii[:, :-1], radii[:, 1:]
     lengths, ratio = np.linalg.norm(steps, axis=2), volumes(points, radii) / rest
     square = a * a + a * b + b * b
-    # The derivatives of C by the length and by both radii.
+    # The derivatives of C with respect to the length and both radii.
     cone = np.pi / 3 / rest
     along, of_a, of_b = cone * square, cone * lengths * (2 * a + b), cone * lengths * (a + 2 * b)
     step = stiffness / 2 * (1 - ratio) / (2 * along**2 + of_a**2 + of_b**2)

@@ -1,12 +1,12 @@
-"""Extended position based dynamics of the muscle surface: constraints with compliances in physical units, in real time.
+"""Extended position based dynamics of the muscle surface: constraints with compliances, and time, in physical units.
 
 Macklin, Mueller and Chentanez 2016, "XPBD: position-based simulation of compliant constrained dynamics",
 DOI 10.1145/2994258.2994272; report section 5.5.3 mentions it. The surface is a membrane with mass around an interior that
 resists change of volume. Position based dynamics, with the same constraints, gets stiffer with every sweep and every step.
-Here too few sweeps give too soft a muscle, enough sweeps give an implicit Euler step, and the equilibrium depends on the time step
-only if directions change within a step. All this holds if the sweeps resolve a step: with ``sqrt(k / m) dt`` of the stiffest edges
-below about 1, or with more sweeps. In the settings for Table 5.1 this number is 3 (1.1 for half of the edges) with one sweep: twice
-the sub-steps change the positions of hip_flexion by up to 1.6 mm, 0.7 mm on average, in a displacement of 53 mm.
+Here, a muscle is too soft after too few sweeps; enough sweeps give an implicit Euler step, and the equilibrium depends on the time
+step only if directions change within a step. All this holds if the sweeps resolve a step: if ``sqrt(k / m) dt`` of the stiffest
+edges is below about 1, or with more sweeps. In the settings for Table 5.1 this number is 3 (1.1 for half of the edges) with one
+sweep: doubling the sub-steps changes positions of hip_flexion by up to 1.6 mm, 0.7 mm on average, in a displacement of 53 mm.
 
 Frame number n is the state after iteration n, ``frame_time`` after the previous frame; in between bones move at constant velocity.
 """
@@ -32,8 +32,8 @@ from fem_reference.solvers.pbd_kernels import dihedrals, distances, pull_dihedra
 
 
 class XpbdCollision(Record):
-    """Contact of bones with free vertices. ``gap`` [mm]: the least distance of a vertex, or its distance at rest if that is less;
-    ``stiffness`` [MPa/mm]: under a pressure p the surface comes nearer by p / stiffness.
+    """Contact of bones with free vertices. ``gap`` [mm]: the distance of a vertex at which contact begins, or its distance at rest
+    if that is less; ``stiffness`` [MPa/mm]: under a pressure p the surface comes nearer by p / stiffness.
     """
 
     gap: Annotated[units.Length, Field(ge=0)]
@@ -43,8 +43,8 @@ class XpbdCollision(Record):
 class XpbdSettings(Record):
     """Settings of the method and of the muscle; every key is required except the keys that add an effect.
 
-    ``frame_time`` [s]: the solver's time between successive frame numbers; the scene's interval applies to the reference and to
-    recorded sequences. ``sub_steps``: time steps in a ``frame_time``. ``sweeps`` over all constraints in each time step.
+    ``frame_time`` [s]: the solver's time between successive frame numbers, in place of the scene's interval. ``sub_steps``: the
+    number of time steps in a ``frame_time``. ``sweeps``: the number of sweeps over all constraints in each time step.
     ``density`` [t/mm3] of the enclosed body; its mass is divided among the vertices in proportion to area.
 
     ``stretch`` [N/mm]: Young's modulus times thickness of a membrane. ``bending`` [N mm]: stiffness of a plate. ``volume`` [MPa]:
@@ -64,7 +64,7 @@ class XpbdSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class XpbdConstraints:
-    """Soft constraints that keep a body's rest state: any graph of edges, closed triangles and hinges, or none of a kind.
+    """Soft constraints towards a body's rest state: any graph of edges, closed triangles, and hinges; each kind may be absent.
 
     ``inverse_masses`` (n,) [1/t], 0 for attached points; ``edges`` (e, 2) of ``lengths`` (e,) [mm] and compliances
     ``edge_softness`` (e,) [mm/N]; ``triangles`` (m, 3) around ``six_volumes`` [mm3], ``volume_softness`` [mm5/N]; ``hinges`` (h,
@@ -84,16 +84,16 @@ class XpbdConstraints:
 
     @classmethod
     def at_rest(cls, surface: Surface, attached: Ints, settings: XpbdSettings) -> "XpbdConstraints":
-        """Constraints of a closed ``surface`` with ``attached`` vertices (k,); none of a kind without stiffness.
+        """Constraints of a closed ``surface`` with ``attached`` vertices (k,); a kind without stiffness is absent.
 
-        In a net of equal triangles, edges of the stiffness ``stretch a / l^2`` of their length l and the area a of both their
-        triangles make a membrane of Young's modulus ``stretch`` and Poisson's ratio 1/3, and hinges of ``bending l^2 / a`` bend
-        as a plate of the stiffness ``bending`` (Seung and Nelson 1988, DOI 10.1103/PhysRevA.38.1005).
+        An edge of length l whose two triangles have the total area a has the stiffness ``stretch a / l^2``, and its hinge
+        ``bending l^2 / a``. In a net of equal triangles they form a membrane of Young's modulus times thickness ``stretch`` and
+        Poisson's ratio 1/3, and a plate of stiffness ``bending`` (Seung and Nelson 1988, DOI 10.1103/PhysRevA.38.1005).
         """
         # Compiled functions need writable arrays.
         points, triangles = np.array(surface.points), np.array(surface.triangles)
         hinges, six_volumes = hinges_of(triangles), volume(points, triangles)[0]
-        areas = sum(triangle_areas(points, hinges[:, corners]) for corners in ([0, 1, 2], [0, 1, 3]))  # both
+        areas = sum(triangle_areas(points, hinges[:, corners]) for corners in ([0, 1, 2], [0, 1, 3]))  # of both
         slender = distances(points, hinges) ** 2 / areas
         stiffnesses = settings.stretch, settings.bending, settings.volume
         stretched, bent, filled = (slice(None if stiffness else 0) for stiffness in stiffnesses)
@@ -113,7 +113,7 @@ class XpbdConstraints:
 
 @dataclass(frozen=True)
 class XpbdStep:
-    """A time step: ``seconds`` long, ``sweeps`` over all constraints, ``damping`` [1/s], ``acceleration`` [mm/s2] from outside."""
+    """A time step: ``seconds`` long, ``sweeps`` over all constraints, ``damping`` [1/s], external ``acceleration`` [mm/s2]."""
 
     seconds: float
     sweeps: int

@@ -28,8 +28,8 @@ SIDE, SHORT, SMALL_TWIST = 10.0, 2.5, 1e-4
 
 
 def flexed(thickness: float, length: float, angle: float, points: Floats, frame: float) -> Floats:
-    """The displacement (n, 3) [mm] of rest points (n, 3) of a block of ``thickness`` from x = 0 and of ``length`` [mm] about y = 0,
-    bent by ``angle`` [rad] times the frame number.
+    """The displacement (n, 3) [mm] of rest ``points`` (n, 3) in a block bent by ``angle`` [rad] times the frame number; the block
+    extends from x = 0 to its ``thickness`` [mm], and its ``length`` [mm] is centred at y = 0.
     """
     centred = points - [thickness / 2, 0.0, 0.0]
     moves: Floats = rivlin.Flexure(1.0, thickness, length, angle * frame).positions(centred) - centred
@@ -56,7 +56,7 @@ def circle(points: Floats) -> float:
 
 
 class Reading(NamedTuple):
-    """A quantity in words, its ``unit``, the reading of it from nodes at rest (n, 3) [mm] and the state, and its truth."""
+    """A quantity in ``words``, its ``unit``, its value from nodes at rest (n, 3) [mm] and the state (``read``), and its truth."""
 
     words: str
     unit: str
@@ -84,8 +84,8 @@ READINGS = {
 
 
 def twisted(lab: Lab, rings: int, end: str, element: str, material: tuple[Effect, ...], degree: int = 2) -> float:
-    """The moment [N mm] about the axis of the cylinder or the force [N] along it on its top, as ``end`` names. Both ends are turned
-    by TWIST times their height and fixed there; with ``degree`` 1 its cells are straight.
+    """The moment [N mm] on the top of the cylinder about its axis, if ``end`` is "moments", or the force [N] along the axis, if it
+    is "forces". Both ends are turned by TWIST times their height and fixed there; with ``degree`` 1 cells are straight.
     """
     mesh = shapes.cylinder(RADIUS, TALL, rings, rings, ELEMENTS[element][0], degree)
     turn = Turn((0.0, 0.0, 1.0), TWIST, per_length=True)
@@ -95,8 +95,8 @@ def twisted(lab: Lab, rings: int, end: str, element: str, material: tuple[Effect
 
 
 def square_bar(lab: Lab, cells: int, element: str, turned: tuple[int, ...]) -> float:
-    """The torque per twist [N mm2], from a quarter of the bar, as small displacements are antisymmetric about planes through its
-    axis. The displacements of its ends are prescribed along the axes ``turned``.
+    """The torque per twist [N mm2]. A quarter of the bar is solved, as small displacements are antisymmetric about planes through
+    its axis. The displacements of its ends are prescribed along the axes ``turned``.
     """
     half = SIDE / 2
     mesh = shapes.box((cells, cells, 1), (half, half, SHORT), ELEMENTS[element][0])
@@ -107,7 +107,7 @@ def square_bar(lab: Lab, cells: int, element: str, turned: tuple[int, ...]) -> f
     return float(4 * lab.solve(body, element, first_step=1.0, residual=1e-12).last.moments["z1"][2] / SMALL_TWIST)
 
 
-CELLS = {"P2/P1": ("tetrahedra", (1, 2, 4)), "Q2/Q1": ("hexahedra", (1, 2, 3))}  # by element: cells and their numbers
+CELLS = {"P2/P1": ("tetrahedra", (1, 2, 4)), "Q2/Q1": ("hexahedra", (1, 2, 3))}  # for each element
 FREE = control("one lateral face is free, so that the block may change its width", faces=("z0",))
 STIFF = control("the shear modulus is 1 % too large", mu=1.01 * MU)
 MIXED = Refinement((1, 2, 3), THICKNESS / 2, order=None, note="no order: the error changes its sign between meshes")

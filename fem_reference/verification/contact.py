@@ -38,8 +38,8 @@ def plate(lab: Lab, element: str, stiffness: float) -> Finding:
 
 
 def in_series(bulk: float, stiffness: float, travel: float) -> float:
-    """The force [N] of a 1 mm block with a ``bulk`` modulus [MPa] in series with a spring of a ``stiffness`` [MPa/mm], whose end
-    is moved down by a ``travel`` [mm]; beyond its smoothing, contact acts as this spring.
+    """The force [N] of a 1 mm block with a ``bulk`` modulus [MPa] in series with a spring of ``stiffness`` [MPa/mm]; the end of the
+    spring is moved down by ``travel`` [mm]. Deeper than its smoothing, contact acts as this spring.
     """
     force = partial(find("loads").squeeze_force, MU, bulk, area=1.0)
 
@@ -68,7 +68,7 @@ def ball_readings(name: str) -> dict[str, Callable[[Frame], float]]:
     }
 
 
-# The readings of a sphere, and the greatest pressure [MPa].
+# The readings of a sphere, and the maximum pressure [MPa].
 READINGS: dict[str, Callable[[Frame], float]] = {
     **ball_readings("ball"),
     "peak_pressure": lambda state: float(state.scalars["contact_pressure"]),
@@ -93,11 +93,11 @@ def known_ball(name: str) -> float:
 
 
 CONTACT = partial(Entry, group="contact", relative=True, kind="closed form")
-# By reading: the end of the entry's name, the end of its title, and the unit.
+# For each reading: the end of the entry's name, the end of its title, and the unit.
 _SAID = {
     "force": ("force", "its force", "N"),
-    "contact_radius": ("radius", "the radius of the contact", "mm"),
-    "peak_pressure": ("pressure", "the greatest pressure", "MPa"),
+    "contact_radius": ("radius", "the contact radius", "mm"),
+    "peak_pressure": ("pressure", "the maximum pressure", "MPa"),
 }
 
 
@@ -109,7 +109,7 @@ def hertzian(
     because: str,
     readings: Iterable[str],
 ) -> Iterator[Entry]:
-    """The entries of a pressed sphere, one for each of the ``readings``, whose words end its ``name`` and ``title``."""
+    """The entries of a pressed sphere: one for each of the ``readings``, with its words inserted in ``name`` and ``title``."""
     for reading in readings:
         end, words, unit = _SAID[reading]
         yield CONTACT(

@@ -1,7 +1,7 @@
 """Cook's membrane: a clamped, tapered panel in plane strain, under a shear load; nearly incompressible, bent and sheared at once.
 
-The panel is one layer of cells, both of whose faces stay in their planes. The small strain solution is computed under a load so
-small that the response is linear, and is scaled up.
+The panel is one layer of cells, whose two faces stay in their planes. The small strain solution is computed under a load so small
+that the response is linear, and is scaled up.
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ from fem_reference.verification.parts import SLOW, clamped, control, find, neare
 
 cook = find("cook")
 THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
-SMALL = 1e-5  # the share of the load at which the response is linear: second-order terms are about 1e-5 of it
+SMALL = 1e-5  # the fraction of the load at which the response is linear: second-order terms are about 1e-5 of it
 RESIDUAL = 1e-5  # at the full load of about 100 N [N, mm3]
-LOCKED = 0.5  # the panel locks if its tip reaches less than this share of the true displacement
+LOCKED = 0.5  # the panel locks if its tip reaches less than this fraction of the true displacement
 
 
 def _place(unit: Floats) -> Floats:
@@ -33,7 +33,7 @@ def _place(unit: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Panel:
-    """The membrane ``name`` of ``validation.cook`` made of an ``element``, under a ``share`` of its load; its moduli are
+    """The membrane ``name`` of ``validation.cook`` with an ``element``, under the fraction ``share`` of its load; its moduli are
     multiplied by ``shear`` and ``bulk`` (1: the true values).
     """
 
@@ -54,7 +54,7 @@ class Panel:
 
 
 def tip(lab: Lab, n: int, **panel: Any) -> float:
-    """The displacement of the corner (48, 60) of a :class:`Panel` along y in n by n cells [mm], divided by its load share."""
+    """The displacement [mm] of the corner (48, 60) of a :class:`Panel` of n by n cells along y, divided by its load fraction."""
     made = Panel(**panel)
     body, first = made.body(n), 0.25 if made.share == 1 else 1.0
     state = lab.solve(body, made.element, first_step=first, residual=RESIDUAL * made.share).last
@@ -76,8 +76,8 @@ MEMBRANES = {
     "FINITE_QUARTER": "at finite strain, a quarter of the load",
     "FINITE": "at finite strain, the full load",
 }
-# By element: the cells in words, and their numbers. The singular clamped corners limit quadratic cells to order 1 or a little
-# more; linear cells, whose error is far larger, converge at order 2.
+# For each element: the cells in words, and the numbers of cells along a side. The singular clamped corners limit quadratic cells to
+# order 1 or a little more; linear cells, whose error is far larger, converge at order 2.
 CELLS = {
     "P1": ("linear tetrahedra", (16, 32, 64)),
     "P1/P1": ("linear tetrahedra with a stabilised linear pressure", (8, 16, 32)),
@@ -99,9 +99,9 @@ SMALL_STRAIN = control("small strain, linearly extrapolated from a tiny load", s
 def tip_entry(
     name: str, panel: dict[str, Any], element: str, wrong: dict[str, Any], stiff: tuple[float, str], **more: Any
 ) -> Entry:
-    """The tip of a ``panel`` made of an ``element``; ``stiff``: the tolerance, and the excess stiffness in words."""
+    """The tip of a ``panel`` with an ``element``; ``stiff``: the tolerance, and the excess stiffness in words."""
     words, counts = CELLS[element]
-    by, order = ("of linear cells", 2) if "1" in element[:2] else ("limited by the singular clamped corners", 1)
+    by, order = ("with linear cells", 2) if "1" in element[:2] else ("limited by the singular clamped corners", 1)
     stated = {"refinement": Refinement(counts, HEIGHT, order)} | wrong | more
     return MEMBRANE(
         name=f"cook_{name}",
@@ -118,7 +118,7 @@ def tip_entry(
 
 
 SHORT = Refinement((4, 8), HEIGHT, order=1)
-LEFT_OPEN = "0.06 %; a clamped corner folds on fine meshes, so that the true value is uncertain by 0.02 %"
+LEFT_OPEN = "0.06 %; a clamped corner folds on fine meshes, so the true value is uncertain by 0.02 %"
 
 ENTRIES: tuple[Entry, ...] = (
     tip_entry("compressible", COMPRESSIBLE, "P2", SOFTER, (0.005, "0.15 %")),
@@ -145,7 +145,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     MEMBRANE(
         name="cook_taylor_hood",
-        title="Taylor-Hood tetrahedra do not lock on the mesh on which linear ones do: ratio of tip displacement to true value",
+        title="Taylor-Hood tetrahedra do not lock where linear tetrahedra do: ratio of tip displacement to true value",
         unit="",
         measure=ratio,
         given={**NEARLY, "n": 8, "element": "P2/P1"},

@@ -17,10 +17,10 @@ from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, control, fin
 damping, viscosity = find("damping"), find("viscosity")
 SECONDS = 0.1  # from one frame to the next, in entries with a drag
 DRAG = 1e-4  # of a block that falls through a viscous medium [MPa s/mm2]
-# A bar in a frictionless box: its length [mm], bulk modulus [MPa] and the rate at which it creeps back [1/s].
+# A bar in a frictionless box: its length [mm], its bulk modulus [MPa], and the rate [1/s] at which it creeps back.
 LENGTH, SOFT, RATE = 10.0, 5 * MU, 5.0
 CREEP = (SOFT + 4 / 3 * MU) * (np.pi / (2 * LENGTH)) ** 2 / RATE  # [MPa s/mm2]
-LIGHT = 1e-6  # a weight [N/mm3], for a stretch of 1e-4
+LIGHT = 1e-6  # the weight [N/mm3] of the bar, which strains it by 1e-4
 ETA, VISCOUS_SECONDS = 0.02, 1.5  # viscosity of the blocks [MPa s], and time from one frame to the next [s]
 BULK = 1e6 * MU  # so high that the closed form for incompressible material holds to 1e-6
 STRESS = 3e-4 * MU  # a small load on the top of a block, which creeps back after its removal
@@ -38,7 +38,7 @@ def velocity(lab: Lab, seconds: float) -> float:
 
 
 def force(lab: Lab, n: int, eta: float) -> float:
-    """The force [N] of a smooth plate that has come down to half the height in one frame, in n load steps."""
+    """The force [N] of a smooth plate after it has moved down to half the height of a block in one frame, in n load steps."""
     plate = Prescribed("plate", "z1", (2,), Affine(NO_GRADIENT, (0.0, 0.0, -0.5)))
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
     acting = (*neo_hooke(MU, BULK), make("viscosity", eta=eta))
@@ -47,14 +47,14 @@ def force(lab: Lab, n: int, eta: float) -> float:
 
 
 def relaxation_rate(solved: Run, numbers: tuple[int, int], seconds: float) -> float:
-    """The rate [1/s] at which the top of a body, its greatest z, goes back to rest between two states, ``seconds`` apart."""
+    """The rate [1/s] at which the top of a body (its maximum z) returns to rest between two states, ``seconds`` apart."""
     rest = solved.states[0].points[:, 2].max()
     ends = [solved.states[number].points[:, 2].max() - rest for number in numbers]
     return float(np.log(ends[0] / ends[1])) / seconds
 
 
 def bar_creep(lab: Lab, n: int, coefficient: float) -> float:
-    """The rate [1/s] at which the bar creeps back from frame 4 to 6, after its weight is removed, in n load steps a frame."""
+    """The rate [1/s] at which the bar creeps back from frame 4 to 6, after its weight is removed, with n load steps per frame."""
     mesh = shapes.box((1, 1, 4), (2.0, 2.0, LENGTH), "hexahedron")
     pull = f"0, 0, {-LIGHT / MUSCLE} mm/s^2"
     gone = make("gravity", density=f"{MUSCLE} tonne/mm^3", acceleration=pull, ramp=UP_AND_GONE)
@@ -65,7 +65,7 @@ def bar_creep(lab: Lab, n: int, coefficient: float) -> float:
 
 
 def block_creep(lab: Lab, n: int, eta: float) -> float:
-    """The rate [1/s] at which the block creeps back from frame 2 to 3, after its load is removed, in n load steps a frame."""
+    """The rate [1/s] at which the block creeps back from frame 2 to 3, after its load is removed, with n load steps per frame."""
     mesh = shapes.box((1, 1, 1), (1.0, 2.0, 3.0), "tetrahedron")
     gone = make("traction", on="z1", force=f"0, 0, {-STRESS} MPa", ramp=UP_AND_GONE)
     acting = (*neo_hooke(MU, BULK), gone, make("viscosity", eta=eta))
@@ -114,8 +114,8 @@ ENTRIES: tuple[Entry, ...] = (
         **control("A drag 1 % too small.", coefficient=0.99 * CREEP),
         truth=lambda: damping.relaxation_rate(MU, SOFT, CREEP, LENGTH),
         within=2e-3,
-        because="With x = rate times the longer load step = 1/16, extrapolated implicit Euler errs by x^2 / 6 = 6.5e-4; the next "
-        "mode, nine times as fast, has decayed to 1e-5, and the finite strain of 1e-4 adds about 1e-4.",
+        because="With x = rate times the longer load step = 1/16, the error of extrapolated implicit Euler is x^2 / 6 = 6.5e-4; "
+        "the next mode, nine times as fast, has decayed to 1e-5, and the finite strain of 1e-4 adds about 1e-4.",
         source="validation/damping.py, relaxation_rate",
         refinement=halved((4, 8, 16), SECONDS, "rate"),
     ),
@@ -125,8 +125,8 @@ ENTRIES: tuple[Entry, ...] = (
         unit="N",
         measure=force,
         truth=lambda: viscosity.squeeze_force(MU, ETA, 0.5, -0.5 / VISCOUS_SECONDS, 1.0),
-        because="The last load step shortens the block by the fraction x of its height, 1/64 with the longer steps. The "
-        "viscous part (0.7 of the force) errs by -2 x + 16/3 x^2 (by hand); extrapolation leaves 0.7 * 8/3 x^2 = 4.6e-4.",
+        because="The last load step shortens the block by the fraction x of its height, 1/64 with the longer steps. The error of "
+        "the viscous part (0.7 of the force) is -2 x + 16/3 x^2 (by hand); extrapolation leaves 0.7 * 8/3 x^2 = 4.6e-4.",
         source="validation/viscosity.py, squeeze_force",
         refinement=halved((32, 64, 128), VISCOUS_SECONDS, "force"),
     ),
@@ -136,8 +136,8 @@ ENTRIES: tuple[Entry, ...] = (
         unit="1/s",
         measure=block_creep,
         truth=lambda: viscosity.creep_rate(MU, ETA),
-        because="With x = rate times the longer load step = 0.047, extrapolated implicit Euler errs by x^2 / 6 = 3.7e-4; the "
-        "finite strain of 1e-4 adds about 1e-4.",
+        because="With x = rate times the longer load step = 0.047, the error of extrapolated implicit Euler is x^2 / 6 = 3.7e-4; "
+        "the finite strain of 1e-4 adds about 1e-4.",
         source="validation/viscosity.py, creep_rate",
         refinement=halved((8, 16, 32), VISCOUS_SECONDS, "rate"),
     ),

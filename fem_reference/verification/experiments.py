@@ -16,7 +16,7 @@ EXPERIMENT = partial(Entry, group="experiments", kind="experiment")
 STIFFER = (make("neo_hooke", mu=0.011), *SHIPPED[1:])
 ISOTROPIC = SHIPPED[:2]
 COLLAGEN = with_collagen(0.3, 0.2, 1.5)
-# By name: the value that the shipped material gives here. These pins guard against unintended change and validate nothing.
+# The value of each entry with the shipped material. These pins guard against unintended change and validate nothing.
 PINNED = {
     "cube_poisson_along": 0.4995238,
     "cube_poisson_fibre": 0.1466180,

@@ -33,7 +33,7 @@ def active(activation: float = 1.0, stress: float = STRESS) -> Material:
 
 
 def two_families(degrees: float) -> Material:
-    """Two families at plus and minus ``degrees`` from the fibre, in the plane normal to z."""
+    """Two families of fibres, at plus and minus ``degrees`` from the fibre direction in the plane normal to z."""
     normal = (0.0, 0.0, 1.0)
     acting = make("holzapfel_ogden", k1="0.01 MPa", k2=1.0, angle=f"{degrees} deg", normal=normal)
     return Material((acting,), laws.HolzapfelOgden(0.01, 1.0, np.radians(degrees), normal))
@@ -86,7 +86,7 @@ ENTRIES = (
     replace(
         force(
             "passive_slack",
-            "Passive fibres (Blemker) that are shortened carry nothing: force of the matrix alone",
+            "Passive fibres (Blemker) that are shortened carry no force: force of the matrix alone",
             muscle(passive(), 0.8),
             "The fibres run across, where the block widens.",
             fibre=Y,
@@ -103,7 +103,7 @@ ENTRIES = (
     *(
         force(
             f"active_{limb}",
-            f"Active fibres held at a stretch of {stretch}, on the {limb} limb of the force-length curve: force",
+            f"Active fibres fixed at a stretch of {stretch}, on the {limb} limb of the force-length curve: force",
             muscle(active(), stretch),
             STRONGER,
             material=NEO + active(stress=1.01 * STRESS),
@@ -143,7 +143,7 @@ ENTRIES = (
     ),
     force(
         "prestretch_fixed",
-        "Muscle with a prestretch of 1.2, held at its length: force",
+        "Muscle with a prestretch of 1.2, fixed at its length: force",
         Specimen(TAUT, "P2/P1", "uniaxial", 1.0),
         "Prestretch 1 % too high.",
         **TAUTER,

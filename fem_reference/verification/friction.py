@@ -19,12 +19,12 @@ from fem_reference.verification.parts import NO_GRADIENT, clamped, control, neo_
 
 FRICTION, MU, BULK = 0.3, 0.01, 0.1  # coefficient, and moduli [MPa]
 WEIGHT, STIFFNESS, HEIGHT = 1e-4, 0.01, 0.5  # pressure under the block [MPa], contact stiffness [MPa/mm], height [mm]
-NEAR = (0.9, 0.99, 0.999, 0.9999, 1.0002, 1.001)  # tangents of the requested angles, in coefficients of friction
+NEAR = (0.9, 0.99, 0.999, 0.9999, 1.0002, 1.001)  # tangents of the requested angles, as multiples of FRICTION
 LAW = ContactLaw("z0", STIFFNESS, 0.01, friction=FRICTION)
 
 
 def incline(lab: Lab, friction: float) -> Finding:
-    """The greatest requested tangent at which a block under its weight still sticks to a plane that turns below it."""
+    """The largest requested tangent at which a block under its weight still sticks to a plane that tilts below it."""
     angles = tuple(float(np.arctan(share * FRICTION)) for share in NEAR)
     frames = (0.0, *(float(i) for i in range(1, 1 + len(NEAR))))
     turning = RigidMotion((0.0, 1.0, 0.0), (0.5, 0.5, 0.0), frames, (0.0, *angles))
@@ -80,27 +80,27 @@ ENTRIES = (
         name="sliding_blocks",
         title="A block that slides over another: ratio of drag to normal force",
         measure=blocks,
-        **control("friction 1 % greater", friction=1.01 * FRICTION),
+        **control("coefficient of friction 1 % higher", friction=1.01 * FRICTION),
         within=2e-3,
         because="under a pressure of a thousandth of the moduli the faces tilt by about 0.001 rad, and with them their normals",
-        source="Coulomb: the drag is the friction times the normal force",
+        source="Coulomb: the drag is the coefficient of friction times the normal force",
     ),
     DRAG(
         name="incline",
-        title="A block on a plane that tilts: tangent of the steepest angle at which it sticks",
+        title="A block on a plane that tilts: tangent of the steepest angle at which the block sticks",
         measure=incline,
-        **control("friction 0.11 % greater", friction=1.0011 * FRICTION),
+        **control("coefficient of friction 0.11 % higher", friction=1.0011 * FRICTION),
         within=1.5e-4,
-        because="tangents are 0.01 % below and 0.02 % above the friction: the block must stick at the first and slip at the second",
+        because="two tangents are 0.01 % below and 0.02 % above the coefficient: the block must stick at one, slip at the other",
         source="Coulomb: the tangent of the angle is the coefficient of friction",
     ),
     DRAG(
         name="sliding_plate",
         title="A plate that slides over a block: ratio of drag to normal force",
         measure=drag,
-        **control("friction 1 % greater", friction=1.01 * FRICTION),
+        **control("coefficient of friction 1 % higher", friction=1.01 * FRICTION),
         within=1e-7,
         because="each sliding point is at its Coulomb limit up to rounding: the residual of 1e-12 N remains, at forces of 1e-4 N",
-        source="Coulomb: the drag is the friction times the normal force",
+        source="Coulomb: the drag is the coefficient of friction times the normal force",
     ),
 )

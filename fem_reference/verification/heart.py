@@ -31,7 +31,7 @@ def helix(cells: Ints, points: Floats) -> Floats:  # noqa: ARG001
 
 @dataclass(frozen=True)
 class Heart:
-    """A problem solved by an ``element`` on cells of ``degree`` (1 straight, 2 curved), its stiffness and active tension
+    """A problem solved with an ``element`` on cells of ``degree`` (1 straight, 2 curved); its stiffness and active tension are
     multiplied by ``stiff`` and ``active`` (1: the true values).
     """
 
@@ -41,7 +41,7 @@ class Heart:
     active: float = 1.0
 
     def effects(self, number: int, on: str) -> tuple[Effect, ...]:
-        """The effects of the problem ``number`` of ``validation.land`` with these factors, its pressure ``on`` a surface."""
+        """The effects of problem ``number`` of ``validation.land``, with these factors, and with its pressure ``on`` a surface."""
         problem = getattr(land, f"PROBLEM_{number}")
         law, tension = problem.law, problem.tension * self.active
         acting = (
@@ -78,7 +78,7 @@ def height(lab: Lab, n: int, body: str, point: Point, **heart: Any) -> float:
 
 
 def _crowded(mesh: Cells) -> Cells:
-    """The ventricle ``mesh`` with cells ``APEX`` times as long at the apex: their angle w from it, 1 at the base, becomes
+    """The ventricle ``mesh`` with cells a = ``APEX`` times as long at the apex: the angle w from the apex, 1 at the base, becomes
     ``w (a + (1 - a) w^2)``. Fibres meet at the apex, and the stress has a logarithmic singularity along the axis.
     """
     points = mesh.points
@@ -91,7 +91,7 @@ def _crowded(mesh: Cells) -> Cells:
     return replace(mesh, points=land.wall(angle - np.pi, around, depth))
 
 
-BOUND = "a bound set by this project: the values were read off figures, second-hand, and no source states their error"
+BOUND = "a bound set by this project: others read the values off figures, and no source states their error"
 HEART = partial(
     Entry,
     group="heart benchmark",

@@ -28,7 +28,7 @@ STEPS = {"first_step": 0.25, "residual": 1e-13}
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """The ``effects`` of a body without its resistance to volume change, and their ``law`` of ``validation/``."""
+    """The ``effects`` of a body without its resistance to volume change, and the same ``law`` from ``validation/``."""
 
     effects: tuple[Effect, ...]
     law: object
@@ -58,11 +58,11 @@ def stretched(face: str, stretch: float) -> Prescribed:
 
 
 def everywhere(gradient: Matrix) -> tuple[Prescribed, ...]:
-    """The whole surface of a box moved by a displacement gradient (3, 3)."""
+    """The six faces of a box, moved by a displacement ``gradient`` (3, 3)."""
     return tuple(Prescribed(face, face, (0, 1, 2), Affine(gradient)) for face in SURFACE)
 
 
-# By name of a function of validation/homogeneous.py: the prescribed motion for a stretch or amount of shear, and the pulled face.
+# For each function in validation/homogeneous.py: the prescribed motion for a stretch or amount of shear, and the pulled face.
 MODES: dict[str, tuple[Callable[[float], tuple[Prescribed, ...]], str]] = {
     "uniaxial": (lambda stretch: (*SYMMETRY, stretched("x1", stretch)), "x1"),
     "equibiaxial": (lambda stretch: (*SYMMETRY, stretched("x1", stretch), stretched("y1", stretch)), "x1"),

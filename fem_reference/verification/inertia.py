@@ -35,7 +35,7 @@ def weight(axis: int, acceleration: float) -> Effect:
 
 
 def fallen(lab: Lab, factor: float) -> float:
-    """The fall [mm] of a free block; its tangent matrix is regular only because of its mass."""
+    """The fall [mm] of a free block, whose tangent matrix is regular only because of its mass."""
     mesh = shapes.box((1, 1, 1), (10.0, 10.0, 10.0), "tetrahedron")
     acting = (*neo_hooke(MU, 1e3 * MU), mass(factor), weight(2, -G))
     solved = lab.solve(Body(mesh, acting, (), frames(10, 10), interval=FALLING / 10), "P2/P1", **STEP)
@@ -43,7 +43,7 @@ def fallen(lab: Lab, factor: float) -> float:
 
 
 def bar(acting: tuple[Effect, ...], prescribed: tuple[Prescribed, ...], count: int, seconds: float) -> Body:
-    """A bar that cannot widen, with one end fixed along its axis, over ``count`` frames that last ``seconds`` in total."""
+    """A bar that cannot widen, one end of which is fixed along its axis, over ``count`` frames that last ``seconds`` in total."""
     mesh = shapes.box((8, 1, 1), (LENGTH, 1.0, 1.0), "tetrahedron")
     fixed = (*sliding("x0", "y0", "y1", "z0", "z1"), *prescribed)
     return Body(mesh, (*neo_hooke(MU, BULK, "P2"), *acting), fixed, frames(count, count), interval=seconds / count)
@@ -65,7 +65,7 @@ def frequency(lab: Lab, steps: int, factor: float) -> float:
 
 
 def departure(lab: Lab, spectral_radius: float) -> Finding:
-    """The greatest change of the total (elastic, kinetic and potential) energy, divided by the greatest kinetic energy, of a block
+    """The maximum change of the total (elastic, kinetic and potential) energy, divided by the maximum kinetic energy, of a block
     clamped at one side that swings under its own weight, which is applied at once.
     """
     mesh = shapes.box((4, 1, 1), (4.0, 1.0, 1.0), "tetrahedron")
@@ -96,7 +96,7 @@ def more(lab: Lab, periods: float, factor: float) -> float:
 
 
 def slow(lab: Lab, factor: float) -> Finding:
-    """The inertia force relative to its slow limit, in pulls each twice as long as the last; its error is of order speed^2."""
+    """The inertia force divided by its limit for slow motion, in three pulls, each twice as long; its error is of order speed^2."""
     ladder = tuple((1 / periods, more(lab, periods, factor)) for periods in (4.0, 8.0, 16.0))
     acceleration = WAY * float(SMOOTH.deriv(2)(0.25)) / (16.0 * PERIOD) ** 2
     known = inertia.pull_of_inertia(DENSITY, LENGTH, 1.0, acceleration)
@@ -135,7 +135,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     MOVING(
         name="swing_energy",
-        title="Clamped block that swings ten times under its weight: greatest change of its energy divided by its kinetic "
+        title="Clamped block that swings ten times under its weight: maximum change of its energy divided by maximum kinetic "
         "energy",
         unit="",
         measure=departure,

@@ -38,7 +38,7 @@ Reading = tuple[float, Callable[[Pressures], float]]
 
 
 def stretches(largest: float, count: int) -> tuple[float, ...]:
-    """Stretches from 1 to the largest, denser at both ends (Chebyshev), so that the interpolating polynomial is accurate."""
+    """Stretches from 1 to the ``largest``, denser at both ends (Chebyshev), so that the interpolating polynomial is accurate."""
     along = (1 - np.cos(np.linspace(0, np.pi, count))) / 2
     return tuple((1 + (largest - 1) * along).tolist())
 
@@ -51,8 +51,8 @@ def slope(solved: Run) -> Chebyshev:
 
 
 def blown(lab: Lab, n: int, reading: Reading, element: str, material: Material, degree: int = 2) -> float:
-    """A ``reading`` of an octant of the sphere with 3 n^2 by 2 n cells, which are straight if ``degree`` is 1. Its inner face is
-    displaced outwards and encloses ``pi a^3 / 6``.
+    """A ``reading`` of an octant of the sphere in 3 n^2 by 2 n cells, which are straight if ``degree`` is 1. The inner face, of
+    radius a, is displaced outwards and encloses ``pi a^3 / 6``.
     """
     largest, read = reading
     grown = Prescribed("inner", "inner", (0, 1, 2), radially(1.0, knots=((1.0, 0.0), (2.0, 1.0), (3.0, 2.0))))
@@ -94,7 +94,7 @@ def tube_pressure(lab: Lab, n: int, **given: Any) -> float:
 
 
 def tube_force(lab: Lab, n: int, **given: Any) -> float:
-    """The force on an end of the whole tube at STRETCH [N]."""
+    """The force [N] on an end of the tube, all four quarters, at STRETCH."""
     return float(4 * tube(lab, n, **given).last.forces["top"][2])
 
 
@@ -110,7 +110,7 @@ def sheathed(lab: Lab, n: int, thickness: float, element: str) -> float:
 
 
 def true_sheathed() -> float:
-    """The stretch at which the pressures that the membrane and the sphere carry add up to that of the fluid."""
+    """The stretch at which the pressures carried by membrane and sphere add up to the pressure of the fluid."""
 
     def left(stretch: float) -> float:
         own = SOFT * true_pressure(TRUE_LAW, stretch)  # pressures are proportional to the moduli

@@ -1,4 +1,4 @@
-"""Weights, pressures and dead forces on blocks."""
+"""Weights, pressures and dead loads on blocks."""
 
 from dataclasses import replace
 from functools import partial
@@ -17,7 +17,7 @@ from fem_reference.verification.homogeneous import BULK, MU, NEO, SIZE, STEPS, S
 loads = parts.find("loads")
 MUSCLE, FAT = 1.06e-9, 0.92e-9  # densities [tonne/mm3]
 FREE_FALL = 9810.0  # mm/s2
-LARGE = (100.0, 50.0, 60.0)  # sides of a block of muscle of 300 ml [mm]
+LARGE = (100.0, 50.0, 60.0)  # sides [mm] of a block of muscle, whose volume is 300 ml
 # Height of a soft column [mm], its bulk modulus [MPa] and its weight [N/mm3], under which it sinks by a tenth of its height.
 HEIGHT, SOFT, WEIGHT = 10.0, 5 * MU, 1e-3
 FLUID, COMPRESSIBLE = 0.1, 1.0  # a pressure, and the bulk modulus of the block that it shrinks [MPa]
@@ -26,7 +26,7 @@ QUARTER = Turn((0.0, 1.0, 0.0), np.pi / 2, knots=((1.0, 0.0), (2.0, 1.0)))
 
 
 def weight(density: float, times: float = 1.0) -> Effect:
-    """Gravity along -z, ``times`` that of the earth, on a material of ``density`` [tonne/mm3]."""
+    """Gravity along -z, ``times`` the earth's gravity, on a material of ``density`` [tonne/mm3]."""
     pull = f"0, 0, {-FREE_FALL * times} mm/s^2"
     return make("gravity", density=f"{density} tonne/mm^3", acceleration=pull, ramp=parts.ramp())
 
@@ -105,7 +105,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=MUSCLE * FREE_FALL * float(np.prod(LARGE)),
         within=2e-9,
         because="The forces of a discrete equilibrium sum to zero on every mesh, up to the residual: over 150 free nodes its norm "
-        "is 1e-10 N, so that its sum may be sqrt(150) times as large.",
+        "is 1e-10 N, so its sum may be sqrt(150) times as large.",
         kind="closed form",
         source="Density times acceleration times volume.",
     ),

@@ -53,8 +53,8 @@ class Above:
 
 
 def vastus(n: int, arm: float) -> Body:
-    """Half a planar muscle whose fibres rise from the bone to an aponeurosis. The end of the aponeurosis is pulled by a moment
-    arm ``arm`` [mm] times the knee flexion. The aponeurosis slides below a fascia, which keeps the muscle's thickness.
+    """Half a planar muscle whose fibres rise from the bone to an aponeurosis. The end of the aponeurosis is displaced by the moment
+    arm ``arm`` [mm] times the knee flexion. The aponeurosis slides below a fascia, which keeps the thickness constant.
     """
     counts, size = (6 * n, 2 * n, 2 * n), (APONEUROSIS, THICK, HALF_WIDTH)
     rising = Brick(lambda u: u * size + u[:, 1:2] * (ALONG, 0, 0), counts, {"y0": "bone", "z0": "middle"})
@@ -78,7 +78,7 @@ def vastus(n: int, arm: float) -> Body:
 
 
 def vastus_stretch(lab: Lab, n: int, arm: float) -> float:
-    """The mean stretch of the fibres from bone to aponeurosis, between their ends."""
+    """The mean stretch of the straight lines between the ends of the fibres, on bone and aponeurosis."""
     body = vastus(n, arm)
     now = lab.solve(body, ELEMENT, first_step=0.25 / n, residual=1e-8).last.points
     low = np.unique(body.mesh.facets["bone"])
@@ -109,7 +109,7 @@ class FittedOgden(Energy):
 
 
 def ball_force(lab: Lab, n: int, depth: float, laws: tuple[Effect, ...]) -> float:
-    """The force [N] of a smooth sphere that is pressed by a ``depth`` [mm] into a muscle on bone, across its fibres."""
+    """The force [N] of a smooth sphere that is pressed to a ``depth`` [mm] into a muscle on bone, across its fibres."""
 
     def place(u: Floats) -> Floats:
         finer = np.column_stack([u[:, 0] ** 1.4, u[:, 1] ** 1.4, 1 - (1 - u[:, 2]) ** 1.2])
@@ -138,7 +138,7 @@ def indentation(lab: Lab, n: int, depth: float, mu: float) -> float:
     return ball_force(lab, n, depth, shipped) / ball_force(lab, n, depth, fitted)
 
 
-# By depth [mm]: half the difference of forces at the exponents 16 and 28, divided by the force at 22; reported deviation: 5.7.
+# For each depth [mm]: half the difference of forces at the exponents 16 and 28 (the reported deviation is 5.7), over that at 22.
 _BY_EXPONENT = {0.6: 0.071, 1.2: 0.271}
 _SARCOMERES = find("chen_2016", "sarcomere_length", "110 deg"), find("chen_2016", "sarcomere_length", "50 deg")
 _STRETCH, _SD = ratio(*_SARCOMERES)
@@ -150,7 +150,7 @@ _OTHER_MU = (
 
 
 def _indented(name: str, share: str, depth: float, pinned: float) -> Entry:
-    """The indentation by a ``depth`` [mm]; ``share`` of the thickness in words."""
+    """The entry of an indentation to a ``depth`` [mm]; ``share``: this fraction of the thickness, in words."""
     spread = (_MU.sd or math.nan) / _MU.value
     return EXPERIMENT(
         name=name,

@@ -90,7 +90,7 @@ def frames(last: float, count: int) -> tuple[float, ...]:
 
 
 def farthest(points: Floats, others: Floats) -> float:
-    """The greatest distance [mm] between corresponding ``points`` (n, 3) and ``others`` (n, 3)."""
+    """The largest distance [mm] between corresponding ``points`` (n, 3) and ``others`` (n, 3)."""
     return float(np.linalg.norm(points - others, axis=1).max())
 
 

@@ -22,14 +22,14 @@ AT_ONCE = {"first_step": 1.0, "smallest_step": 0.9, "residual": 1e-13}  # a fail
 
 
 def patch(element: str, degree: int, share: float = 1.0) -> Body:
-    """A warped box whose whole surface moves by ``share`` times ``GRADIENT``, for an ``element`` on cells of a ``degree``."""
+    """A warped box whose surface moves by ``share`` times ``GRADIENT``, for an ``element`` on cells of a ``degree``."""
     mesh = shapes.warped_box(COUNTS, SIZE, ELEMENTS[element][0], degree, BUMP)
     a, b, c = ((share * x, share * y, share * z) for x, y, z in GRADIENT)
     return Body(mesh, (*NEO.effects, resistance(element, BULK)), everywhere((a, b, c)), (0, 1))
 
 
 def patch_error(lab: Lab, element: str, degree: int, share: float = 1.0) -> float:
-    """The largest distance [mm] of a node from its place under the full gradient."""
+    """The largest distance [mm] of a node from its exact position under ``GRADIENT``."""
     body = patch(element, degree, share)
     points = lab.solve(body, element, first_step=0.5, residual=1e-13).last.points
     return farthest(points, body.mesh.points @ (np.eye(3) + np.array(GRADIENT)).T)
@@ -41,8 +41,8 @@ def turn(share: float) -> Turn:
 
 
 def states(lab: Lab, material: Material, element: str, faces: tuple[str, ...], further: float) -> tuple[Frame, Frame]:
-    """A warped box before and after a turn of its ``faces``; z1, or the whole surface, turns ``further`` times the angle. The whole
-    surface turns in one step, two ends in several. Before the turn, at frame 1, the box is at rest, or contracted by its fibres.
+    """A warped box before and after a turn of its ``faces``; z1, or every face if all turn, turns ``further`` times the angle. All
+    faces turn in one step, two ends in several. Before the turn, at frame 1, the box is at rest, or contracted by its fibres.
     """
     mesh = shapes.warped_box(COUNTS, SIZE, ELEMENTS[element][0], 1, BUMP)
     moved = SURFACE if faces == SURFACE else ("z1",)
@@ -53,7 +53,7 @@ def states(lab: Lab, material: Material, element: str, faces: tuple[str, ...], f
 
 
 def turned_error(lab: Lab, material: Material, element: str, faces: tuple[str, ...], further: float = 1.0) -> float:
-    """The largest distance [mm] of a node from its place after the turn."""
+    """The largest distance [mm] of a node from its exact position after the turn."""
     before, after = states(lab, material, element, faces, further)
     return farthest(after.points, before.points + turn(1.0)(before.points, 2))
 

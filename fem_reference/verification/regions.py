@@ -15,14 +15,14 @@ from fem_reference.verification.homogeneous import stretched
 from fem_reference.verification.parts import control, find, resistance, sliding
 
 series = find("series")
-SIZE, LONGER = (10.0, 2.0, 2.0), 1.2  # [mm], and the stretch; the cross-section is kept
+SIZE, LONGER = (10.0, 2.0, 2.0), 1.2  # [mm], and the stretch; the cross-section stays constant
 MU, BULK, RATIO = 0.01, 0.1, 1000.0  # [MPa] of the soft material, and the ratio of the stiffnesses
 STIFF, WIDTH = 4.0, 2.0  # length of the stiff part and width of the transition [mm]
 
 
 @dataclass(frozen=True)
 class Below:
-    """The depth below the plane at ``x`` [mm]."""
+    """The depth below the plane at ``x`` [mm], positive on the side of smaller x."""
 
     x: float
 
@@ -32,7 +32,7 @@ class Below:
 
 
 def bar(element: str, cells: int, width: float, stiff: float = STIFF) -> Body:
-    """The bar in ``cells`` along its length, its first ``stiff`` mm a thousand times as stiff as the rest."""
+    """The bar with ``cells`` along its length, of which the first ``stiff`` mm are a thousand times as stiff as the others."""
     mesh, laws = shapes.box((cells, 1, 1), SIZE, ELEMENTS[element][0]), []
     for region, factor in (("tendon", RATIO), ("not tendon", 1.0)):
         laws.append(make("neo_hooke", mu=factor * MU, **{"in": region}))

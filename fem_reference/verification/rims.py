@@ -19,7 +19,7 @@ from fem_reference.verification.parts import clamped, control, find, neo_hooke, 
 ELEMENT = "Q2/Q1"
 MU, BULK = 0.01, 10.0  # [MPa]
 LOAD = 1e-4  # [MPa]
-UNIFORM, GRADED = 1.0, 0.5  # the exponent m of h ~ r^(1 - m); 1 is not graded
+UNIFORM, GRADED = 1.0, 0.5  # the exponent m of cell sizes h ~ r^(1 - m), r from the rim; 1 is not graded
 
 
 def _side(sign: float, depth: float, grading: float, unit: Floats) -> Floats:
@@ -39,7 +39,7 @@ def _halves(counts: shapes.Counts, grading: float) -> Cells:
 
 
 def body(level: int, grading: float, *, plane: bool) -> Body:
-    """A slice in ``plane`` strain with 4 cells a side, or a block with free ends and 3 cells a side; each ``level`` halves them."""
+    """A slice in ``plane`` strain, 4 cells a side, or a block with free ends, 3 cells a side; each ``level`` halves cell sizes."""
     n = (4 if plane else 3) * 2**level
     acting = (*neo_hooke(MU, BULK), make("traction", on="pulled", force=f"{LOAD}, 0, 0 MPa", ramp=ramp()))
     fixed = (*clamped("clamped"), *sliding("x0", *(("y0", "y1") if plane else ())))
@@ -59,10 +59,9 @@ CONTROLS = {
     UNIFORM: control("meshes graded towards the rim", grading=GRADED),
     GRADED: control("uniform meshes", grading=UNIFORM),
 }
-PLANE = "the coarsest of the three meshes has 4 cells a side; on finer meshes the order is"
-ON_PLANE = "A clamped patch in plane strain: order of convergence of its force, uniform quadratic hexahedra"
-ON_BLOCK = "A clamped patch on a block with free ends: order of convergence of its force, uniform quadratic hexahedra"
-GRADED_TOO = "The same, on meshes graded towards the rim"
+PLANE = "the coarsest of the three meshes has 4 cells a side; finer meshes bring the order closer to the true one by"
+ON_PLANE = "A clamped patch in plane strain: order of convergence of its force, with quadratic hexahedra,"
+ON_BLOCK = "A clamped patch on a block with free ends: order of convergence of its force, with quadratic hexahedra,"
 SPACE = "the coarsest of three meshes has 3 cells a side and one cell along the rim, whose ends add their own error"
 
 ENTRIES = tuple(
@@ -81,9 +80,9 @@ ENTRIES = tuple(
         source="validation/rims.py: Williams 1952",
     )
     for name, grading, within, title, because in (
-        ("rim_plane", UNIFORM, 0.1, ON_PLANE, f"{PLANE} 0.006 closer"),
-        ("rim_plane_graded", GRADED, 0.2, f"{GRADED_TOO}, h ~ r^(1/2)", f"{PLANE} 0.1 closer"),
-        ("rim_block", UNIFORM, 0.2, ON_BLOCK, SPACE),
-        ("rim_block_graded", GRADED, 0.4, GRADED_TOO, SPACE),
+        ("rim_plane", UNIFORM, 0.1, f"{ON_PLANE} uniform", f"{PLANE} 0.006"),
+        ("rim_plane_graded", GRADED, 0.2, f"{ON_PLANE} graded towards the rim, h ~ r^(1/2)", f"{PLANE} 0.1"),
+        ("rim_block", UNIFORM, 0.2, f"{ON_BLOCK} uniform", SPACE),
+        ("rim_block_graded", GRADED, 0.4, f"{ON_BLOCK} graded towards the rim, h ~ r^(1/2)", SPACE),
     )
 )

@@ -23,7 +23,7 @@ from fem_reference.foundations.errors import InputError
 
 log = logging.getLogger(__name__)
 
-# The time [s] within which a signal to all processes reaches this one, after it has ended a process of a lab.
+# The time [s] within which a signal to all processes, after it has ended the process of a lab, reaches this process too.
 HEARD = 0.5
 # Errors that fail one entry while the others go on; any other is a bug in this package, or an interrupt.
 FAILURES = (InputError, ValueError, ArithmeticError, LookupError, RuntimeError, OSError)
@@ -76,7 +76,7 @@ def run(
     negative control.
 
     Two entries run at a time if there are two cores, each thread with its own lab. The labs are closed even after an error. Entries
-    that an interrupt or an error ends with their labs have no result.
+    whose labs an interrupt or an error ends have no result.
     """
     ended = threading.Event()
     begin, reporting, done = time.perf_counter(), threading.Lock(), count(1)

@@ -30,7 +30,7 @@ def _slides(direction: list[float], distance: str) -> dict[str, object]:
 
 
 def bar(ball: str = "2 mm") -> MuscleProblem:
-    """A bar of 10 x 10 x 40 mm between two bones, one of which moves by 3 mm; a sphere of radius 3 mm moves by ``ball`` into it."""
+    """A bar of 10 x 10 x 40 mm between two bones, one of which moves by 3 mm; a sphere of radius 3 mm moves into it by ``ball``."""
     ball_bone = {"sphere": {"centre": "-3.2, 5, 20 mm", "radius": "3 mm"}, "motion": _slides([1, 0, 0], ball)}
     hold = [{"face": "z0"}, {"face": "z1", "motion": _slides([0, 1, 0], "3 mm")}]
     table = {
@@ -111,7 +111,7 @@ def touching_denials(lab: Lab, farther: float = 0.0) -> Finding:
 
 
 def unbalanced(lab: Lab, lost: float = 0.0) -> Finding:
-    """The number of balance checks that the pressed blocks fail, if a share ``lost`` of the force that moves them is missing."""
+    """The number of balance checks that the pressed blocks fail if the fraction ``lost`` of the driving force is missing."""
     body = pressed_blocks(BLOCK_STIFFNESS)
     run = lab.solve(body, "P2/P1", first_step=0.5)
     forces = run.last.forces | {"high_z1": (1 - lost) * run.last.forces["high_z1"]}

@@ -1,8 +1,8 @@
 """FEniCSx and scikit-fem on the same bodies, and the linear solvers of FEniCSx, which must not change the solution.
 
-FEniCSx and scikit-fem share no assembly, no derivatives and no linear algebra. Their discretisations are the same, so that their
-states differ by Newton's residual and, where quadrature is not exact, by their rules: both use Gauss-Legendre in hexahedra, but
-different points in tetrahedra, where the difference vanishes with the degree of the rules.
+FEniCSx and scikit-fem share no assembly, no derivatives and no linear algebra. Their discretisations are the same, so their states
+differ by Newton's residual and, where quadrature is not exact, by their rules: both use Gauss-Legendre in hexahedra, but different
+points in tetrahedra, where the difference vanishes as the degree of the rules increases.
 """
 
 from collections.abc import Callable
@@ -38,7 +38,7 @@ def agreement(
 ) -> Finding:
     """The largest of the relative differences of :func:`differences`.
 
-    ``residual`` [N, mm3]; ``quadrature``: the degree of both rules, or None for their own; ``error``: that of scikit-fem's modulus.
+    ``residual`` [N, mm3]; ``quadrature``: the degree of both rules, or None for the defaults; ``error``: of scikit-fem's modulus.
     """
     settings: dict[str, float] = {"first_step": 0.5, "residual": residual}
     if quadrature is not None:
@@ -52,8 +52,8 @@ def agreement(
 
 
 def differences(first: Frame, second: Frame, rest: Floats) -> dict[str, float]:
-    """The relative differences between two states of a body: of node positions, relative to the greatest displacement from ``rest``
-    (n, 3), of energies, and of forces and moments over the greatest of them.
+    """The relative differences between two states of a body: of node positions, relative to the largest displacement from ``rest``
+    (n, 3); of energies; and of forces and moments, relative to the largest component.
     """
     return {
         "positions": parts.farthest(second.points, first.points) / parts.farthest(first.points, rest),
@@ -71,7 +71,7 @@ def _difference(first: dict[str, Floats], second: dict[str, Floats]) -> float:
 def built(
     acting: tuple[Effect, ...], mesh: Callable[..., Cells], prescribed: tuple[Prescribed, ...], element: str
 ) -> Body:
-    """A body with the ``acting`` effects and a resistance to volume change; ``mesh`` makes its cells from their kind."""
+    """A body with the ``acting`` effects and a resistance to volume change; ``mesh`` makes cells of the kind of ``element``."""
     acting = (*acting, parts.resistance(element, 1.0))
     return Body(mesh(kind=ELEMENTS[element][0]), acting, prescribed, (0.0, 1.0), Along((2 / 7, 3 / 7, 6 / 7)))
 
@@ -92,7 +92,7 @@ def turned_bar(lab: Lab, solver: str, precision: str | None, residual: float) ->
 
 
 def difference(lab: Lab, solver: str, precision: str | None = None, residual: float = RESIDUAL) -> float:
-    """The largest distance [mm] of a node from its position by the direct solver in double precision."""
+    """The largest distance [mm] of a node from its position according to the direct solver in double precision."""
     return parts.farthest(turned_bar(lab, "direct", "double", RESIDUAL), turned_bar(lab, solver, precision, residual))
 
 
@@ -200,7 +200,7 @@ EXTENDED = "A block of Mooney-Rivlin material pulled to 1.3 times its length"
 LAGGED = Entry(
     name="lagged_factorisation",
     group="linear solvers",
-    title="Turned bar of muscle with lagged factorisations in double precision and direct ones: largest difference of a node",
+    title="Turned bar of muscle: largest difference of a node between lagged factorisations, in double precision, and direct ones",
     unit="mm",
     measure=difference,
     given={"solver": "lagged", "precision": "double"},
@@ -221,7 +221,7 @@ ENTRIES: tuple[Entry, ...] = (
     specimen("pulled", "with active fibres, pulled by a dead load", ACTIVE_BLOCK),
     specimen("febio", "with FEBio's fibres, stretched along them", fibres.muscle(fibres.passive_febio(), 1.6)),
     specimen("tension", "with fibres of constant tension, shortened to 0.9", fibres.muscle(fibres.tension(), 0.9)),
-    specimen("taut", "of prestretched muscle, held at its length", Specimen(fibres.TAUT, "P2/P1", "uniaxial", 1.0)),
+    specimen("taut", "of prestretched muscle, fixed at its length", Specimen(fibres.TAUT, "P2/P1", "uniaxial", 1.0)),
     specimen("neo_hooke", "of neo-Hookean material, stretched along one axis", Specimen(NEO, "P1", "uniaxial", 1.6)),
     opinion("patch", PATCH, partial(patch, "Q2/Q1", 2), "Q2/Q1", STEEPER),
     opinion("cook", COOK, partial(Panel("FINITE_QUARTER", "Q2/Q1").body, 4), "Q2/Q1", BY_GAUSS),
@@ -246,14 +246,14 @@ ENTRIES: tuple[Entry, ...] = (
     replace(
         LAGGED,
         name="lagged_factorisation_single",
-        title="Turned bar of muscle with lagged factorisations in single precision and direct ones in double: largest difference "
-        "of a node",
+        title="Turned bar of muscle: largest difference of a node between lagged factorisations, in single precision, and direct "
+        "ones in double precision",
         given={"solver": "lagged", "precision": "single"},
     ),
     replace(
         LAGGED,
         name="multigrid",
-        title="Turned bar of muscle with multigrid between P2 and P1 and with direct factorisations: largest difference of a node",
+        title="Turned bar of muscle: largest difference of a node between multigrid (P2 and P1) and direct factorisations",
         within=1e-8,
         given={"solver": "multigrid"},
     ),

@@ -2,8 +2,8 @@
 it sticks, until its corners fold over.
 
 Between smooth plates every state is homogeneous. Below half the height this state is unstable, but Newton's method follows it, as a
-structured mesh does not disturb it. On the return path, too large a load step finds another stress-free state, the block turned by
-half a turn through its planes of symmetry. This state is rejected, as det F falls to 0 on the straight line to it.
+structured mesh does not disturb it. On the return path, too large a load step finds another stress-free state, the block rotated by
+half a turn, beyond its planes of symmetry. This state is rejected, as det F falls to 0 on the straight line to it.
 
 If the bulk modulus is low, there is a height below which no state near the rest volume exists. The isochoric neo-Hookean energy
 favours a smaller volume, which the law ``K/2 (J - 1)^2`` cannot prevent: its pressure is K at most. With free sides the equilibrium
@@ -31,7 +31,7 @@ GLUED_TO, GLUED_STEPS = 0.4, 12
 POISSON = 0.3  # of a block that collapses
 # Stretches on the branch of states that begins at rest; from 0.45 on, the volume falls steeply, from 0.59 to 0.42 of V0.
 STRETCHES = (1.0, 0.8, 0.6, 0.5, 0.45, 0.43, 0.425, 0.42, 0.415, 0.41, 0.405, 0.4)
-LOWEST = 0.5  # the least V/V0 in the range of the law
+LOWEST = 0.5  # the smallest V/V0 in the range of the law
 
 
 def bulk_modulus(poisson: float) -> float:
@@ -47,8 +47,8 @@ def plated(lab: Lab, element: str, bulk: float, path: Affine, numbers: tuple[flo
 
 
 def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: float = 1.0) -> tuple[Frame, ...]:
-    """All states of the block on the path down and on the fraction ``back`` of the return: at even load steps, or, if the steps are
-    ``growing``, at the ends of both paths.
+    """All states of the block on the path down and on the fraction ``back`` of the return: after equal load steps or, if the steps
+    are ``growing``, at the ends of both paths.
     """
     path = Affine(NO_GRADIENT, (0.0, 0.0, HEIGHT - 1), ((0.0, 0.0), (1.0, 1.0), (2.0, 1 - back)))
     # Newton's method solves for every state, on the return path too.
@@ -57,7 +57,7 @@ def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: 
 
 
 def _finding(value: float, states: tuple[Frame, ...]) -> Finding:
-    """The finding with the cost of the squeeze, and the smallest det F of all its states."""
+    """The finding, with a note on the Newton iterations of the squeeze and the smallest det F of all its states."""
     scalars = [state.scalars for state in states]
     smallest = min(min(one["min_det_F_quadrature"], one["min_det_F_vertices"]) for one in scalars)
     iterations = sum(one["newton_iterations"] for one in scalars)
@@ -108,7 +108,7 @@ def outside(lab: Lab, element: str, poisson: float) -> Finding:
 
 
 def glued(lab: Lab, element: str, count: int, height: float, **settings: Any) -> Run:
-    """The states of a cube of ``count`` cells a side between plates that it sticks to, down to a ``height``."""
+    """The states of a cube with ``count`` cells a side between plates to which it sticks, down to a ``height``."""
     mesh = shapes.box((count,) * 3, (1.0, 1.0, 1.0), ELEMENTS[element][0])
     top = Prescribed("top", "z1", (0, 1, 2), Affine(NO_GRADIENT, (0.0, 0.0, height - 1)))
     body = Body(mesh, neo_hooke(MU, 10.0), (*clamped("z0"), top), frames(1, GLUED_STEPS))
@@ -202,7 +202,7 @@ ENTRIES: tuple[Entry, ...] = (
             unit="mm",
             measure=distance_from_rest,
             given={"element": element, "bulk": bulk, "growing": growing},
-            **control("the plates stop short of their return by a thousandth of the way", back=0.999),
+            **control("the plates stop a thousandth of the path before their return", back=0.999),
             truth=0.0,
             because=f"{EXACT}; an elastic body recovers completely",
             kind="property",
@@ -216,7 +216,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     GLUED(
         name="bonded_squeeze_is_inverted",
-        title="A cube squeezed to 0.4 of its height between plates that it sticks to folds over at its corners, with Q1/P0",
+        title="A cube squeezed to 0.4 of its height between plates to which it sticks folds over at its corners, with Q1/P0",
         measure=inverts,
         given={"element": "Q1/P0", "count": 4, "height": GLUED_TO},
         **control("squeezed to 0.7 of its height only", height=0.7),
@@ -224,14 +224,14 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     GLUED(
         name="bonded_squeeze_stays_upright",
-        title="A cube squeezed to 0.7 of its height between plates that it sticks to keeps det F above zero, with Q2/Q1",
+        title="A cube squeezed to 0.7 of its height between plates to which it sticks keeps det F above zero, with Q2/Q1",
         measure=stays_upright,
         given={"element": "Q2/Q1", "count": 2, "height": 0.7},
         **control("squeezed to 0.4 of its height", height=GLUED_TO),
     ),
     GLUED(
         name="bonded_squeeze_with_vertices",
-        title="A cube squeezed to 0.4 of its height between plates that it sticks to keeps det F above zero, with P2/P1",
+        title="A cube squeezed to 0.4 of its height between plates to which it sticks keeps det F above zero, with P2/P1",
         measure=stays_upright,
         given={"element": "P2/P1", "count": 2, "height": GLUED_TO},
         **control("a quadrature rule of degree 4, which has no points at the vertices", quadrature_degree=4),

@@ -32,7 +32,7 @@ def _lowered(name: str, path: float, components: tuple[int, ...]) -> Prescribed:
 
 
 def pressed_blocks(stiffness: float, apart: float = 0.0) -> Body:
-    """Two blocks with non-matching meshes, ``apart`` [mm] at rest, together as high as they are wide; the upper one moves down."""
+    """Two blocks with non-matching meshes, ``apart`` [mm] at rest, that form a cube together; the upper block moves down."""
     low, high = (shapes.box(counts, (1.0, 1.0, 0.5), "tetrahedron") for counts in ((3, 3, 2), (4, 5, 2)))
     mesh = shapes.joined({"low": low, "high": replace(high, points=high.points + [0, 0, 0.5 + apart])})
     moved = _lowered("high_z1", TRAVEL + apart, (2,))
@@ -42,7 +42,7 @@ def pressed_blocks(stiffness: float, apart: float = 0.0) -> Body:
 
 
 def blocks(lab: Lab, stiffness: float, *, itself: bool = False) -> Finding:
-    """The force [N] between the pressed blocks; their faces are two surfaces, or one that touches ``itself``."""
+    """The force [N] between the pressed blocks; their faces are two surfaces, or one surface that touches ``itself``."""
     body = pressed_blocks(stiffness, SMOOTHING if itself else 0.0)
     if itself:  # the blocks are then farther apart than the smoothing, without pressure at rest
         (law,), facets = body.touching, body.mesh.facets
@@ -51,11 +51,11 @@ def blocks(lab: Lab, stiffness: float, *, itself: bool = False) -> Finding:
     state = lab.solve(body, "P2/P1", first_step=0.5, residual=1e-11).last
     # The force acts on an area of 1 mm2.
     most = state.scalars["touching_pressure"] / -float(state.forces["high_z1"][2])
-    return Finding(float(state.forces["high_z1"][2]), note=f"the greatest pressure is {most:.3f} times the mean")
+    return Finding(float(state.forces["high_z1"][2]), note=f"the maximum pressure is {most:.3f} times the mean")
 
 
 def _quarter(n: int) -> Cells:
-    """A quarter of a large body, z >= 0, ``n`` cells in its core, larger ones outside; its region "near" is the middle of z0."""
+    """A quarter of a large body, z >= 0, with ``n`` cells in its core and larger cells outside; "near" is the middle of z0."""
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
     flat = mesh.facets["z0"]
     near = np.linalg.norm(mesh.points[flat][..., :2], axis=2).max(axis=1) < FLAT
@@ -63,7 +63,7 @@ def _quarter(n: int) -> Cells:
 
 
 def pressed(lab: Lab, n: int, radius: float) -> Frame:
-    """A quarter of a flat body below z = 0 and of a body above with a bump of ``radius`` [mm]; their ends approach by APPROACH."""
+    """A quarter of a flat body below z = 0 and of a body above it with a bump of ``radius`` [mm]; far ends approach by APPROACH."""
     low, high = _quarter(n), _quarter(n + 1)
     away = np.hypot(high.points[:, 0], high.points[:, 1])
     beyond = FLAT**2 / (2 * radius) + FLAT**2 / radius * np.tanh((away - FLAT) / FLAT)  # far from the contact
@@ -108,7 +108,7 @@ ENTRIES = (
             **control("contact 1 % stiffer", stiffness=1.01 * BLOCK_STIFFNESS),
             truth=partial(contact.in_series, SOFT, BLOCK_STIFFNESS, TRAVEL),
             within=2e-4,
-            because="quadrature on one mesh is not exact for functions of the other: the force errs by 6e-5, the pressure by 2 %",
+            because="quadrature on one mesh is not exact for functions of the other: errors of 6e-5 in force, 2 % in pressure",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
         )
         for name, words in (("blocks_p2_p1", ""), ("blocks_as_one", ", as one surface that touches itself"))

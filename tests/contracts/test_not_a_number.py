@@ -27,7 +27,7 @@ def test_what_is_not_a_number_is_no_solution(session) -> None:  # noqa: F811
     for wrong in (nothing, replace(nothing, components=(2,)), replace(nothing, stiffness=1.0)):
         solved = session.solve(replace(body, prescribed=(body.prescribed[0], wrong)), settings("Q1/P0"))
         assert solved.outcome.status == "diverged"
-        assert "a prescribed path, has no value in 0 iterations" in solved.outcome.message
+        assert "in 0 iterations a state where a law, or a prescribed path, has no value" in solved.outcome.message
         assert np.isfinite(solved.states[-1].points).all()
 
 

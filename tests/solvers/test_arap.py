@@ -297,7 +297,7 @@ def test_a_tolerance_that_is_not_met_is_reported_at_the_end_and_all_frames_are_k
     outcome, frames = run(setup, tolerance="1e-6 mm")
     assert outcome.status == "out of steps"
     assert outcome.message.startswith(
-        "10 frames in 50 iterations, of which 10 did not meet the tolerance; more iterations or a larger tolerance may help"
+        "10 frames in 50 iterations; 10 frames did not meet the tolerance; more iterations or a larger tolerance may help"
     )
     assert outcome.cost["frames_off_tolerance"] == 10
     assert list(frames) == list(range(11))

@@ -227,7 +227,7 @@ def test_a_tolerance_that_is_not_met_is_reported():
     setup = attached_setup(None, SWING, last=10)
     outcome, frames = run(setup, tolerance="1e-6 mm")
     assert outcome.status == "out of steps"
-    assert outcome.message.startswith("10 frames in 50 iterations, of which 10 did not meet the tolerance; ")
+    assert outcome.message.startswith("10 frames in 50 iterations; 10 frames did not meet the tolerance; ")
     assert list(frames) == list(range(11))
 
 

@@ -310,7 +310,7 @@ def test_candidate_toml_describes_the_command(tmp_path) -> None:
     assert (found.name, found.solver, found.settings["count"]) == ("own", "command", 3)
     assert solvers.settings(found, "test").unit == 10
     for more, problem in (
-        ("speed = [1]", "ladder.speed: got a setting that the command does not mention, want one of its own: count"),
+        ("speed = [1]", "ladder.speed: got a setting that the command does not mention, want one of these: count"),
         ("[other]", "other: got an unknown key"),
         ("[settings.more]", "settings"),
     ):

@@ -135,7 +135,7 @@ def test_the_page_shows_a_dash_and_says_that_there_is_no_surface(compared) -> No
     [
         ('name = "line"\n', 'name = "line"\nvia = [{ at = 0.5, bone = "skull" }]\n', 'via[0].bone: got "skull", want one of'),
         ('name = "line"\n', SPHERE_ON_NOTHING, 'obstacle[0].bone: got "skull", want one of floor, lid'),
-        ('name = "line"\n', SPHERE_AROUND_THE_END, "an obstacle with all of them outside"),
+        ('name = "line"\n', SPHERE_AROUND_THE_END, "an obstacle with all fixed points outside"),
         ('name = "line"\nsolver = "line_of_action"', MULTIGRID_ON_TWO_RANKS, "ranks: got 2, want 1"),
     ],
 )  # fmt: skip

@@ -19,7 +19,7 @@ from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.muscle import MOST_FRAMES
 from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble
 
-# Fractions of a frame at which motions are sampled to find bones that turn too far from one sample to the next.
+# The maximum number of samples of a motion per frame; they show whether a bone turns too far from one sample to the next.
 _PARTS = 16
 
 
@@ -57,7 +57,7 @@ def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> O
 
 
 def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
-    """Trouble with a bone that turns too far between two samples of its pose, or out and back; None without trouble."""
+    """Trouble with a bone that moves too far, or out and back, between two samples of its pose; None without trouble."""
     if all(bone.motion is None for bone in setup.bones):
         return None
     points, count = setup.surface.points, (setup.frames[-1] - setup.frames[0]) * per_frame
@@ -83,7 +83,7 @@ def refused(model: FrameModel, first: int, sink: Sink, why: Trouble) -> Outcome:
 
 
 def each(model: FrameModel, numbers: Iterable[int], wanted: tuple[int, ...], sink: Sink) -> Outcome:
-    """Advance ``model`` to the frame ``numbers`` one after the other; ``sink`` gets the ``wanted`` frames."""
+    """Advance ``model`` through the frame ``numbers``; ``sink`` gets the ``wanted`` frames."""
     cost = _begun(model)
     for number in numbers:
         begin = time.perf_counter()
@@ -108,8 +108,8 @@ def _begun(model: FrameModel) -> dict[str, float]:
 def timed[M: FrameModel, S: Record](
     make: Callable[[Any, S], M], setup: Setup, settings: S, quick: S | None = None
 ) -> M:
-    """The model that ``make`` builds from ``setup`` and ``settings``, with its ``seconds_setup`` in the cost. Before that, a frame
-    of a tetrahedron is solved, with ``quick`` settings if given, to compile every function, in ``seconds_compile``.
+    """The model that ``make`` builds from ``setup`` and ``settings``, with ``seconds_setup`` in its cost. Before that, one frame of
+    a tetrahedron is solved, with ``quick`` settings if given, to compile every function; this takes ``seconds_compile``.
     """
     begin = time.perf_counter()
     first = make(tetrahedron(), quick or settings)
@@ -134,7 +134,7 @@ def tetrahedron() -> MuscleProblem:
 
 
 class MovingSurface:
-    """The surface of a muscle going from frame number to frame number, with its vertices at ``points`` (n, 3) [mm]."""
+    """The surface of a muscle that moves from each frame number to the next, with its vertices at ``points`` (n, 3) [mm]."""
 
     advice = "a slower motion, more steps or a lower stiffness may help"
 
@@ -149,7 +149,7 @@ class MovingSurface:
         return self.check.trouble(self.points)
 
     def frame(self, number: int) -> Frame:
-        """The surface."""
+        """The present surface."""
         return Frame(number, self.points.copy())
 
     def ending(self) -> Outcome:

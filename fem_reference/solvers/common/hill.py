@@ -1,9 +1,9 @@
 """A Hill-type muscle: a contractile and a parallel element at a pennation angle, in series with a tendon (report 5.1, Figure 5.1).
 
 Forces are relative to the maximum isometric force F0, fibre lengths to the optimal length l0; velocities of shortening are positive
-(5.1). The curves are those of Thelen (2003, doi 10.1115/1.1531112), with constants as in OpenSim's ``Thelen2003Muscle``;
-the structure is Zajac's (1989), and the hyperbola (5.1) is Hill's. Its constants follow from a / F0 and the maximum shortening
-velocity, ``b = a / F0 vmax``. Unlike in Thelen's model, this velocity does not depend on the activation.
+(eq. 5.1). The curves are those of Thelen (2003, doi 10.1115/1.1531112), with constants as in OpenSim's ``Thelen2003Muscle``;
+the structure is Zajac's (1989), and the hyperbola (eq. 5.1) is Hill's. Its constants follow from a / F0 and the maximum shortening
+velocity vmax: ``b = a / F0 vmax``. Unlike in Thelen's model, vmax does not depend on the activation.
 """
 
 import math
@@ -19,12 +19,12 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Angle, Force, PositiveLength
 
-# Thelen 2003, young adults: width of the active curve; shape of the passive curve and its strain at F0; the strain of the tendon at
-# F0; the greatest force in lengthening.
+# Thelen 2003, young adults: the width of the active curve; the shape of the passive curve and its strain at F0; the strain of the
+# tendon at F0; the maximum force in lengthening.
 _WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN, _LENGTHENING = 0.45, 5.0, 0.6, 0.04, 1.4
-# The tendon's toe ends at this share of F0, with this shape; beyond it the curve is a straight line with the slope at its end.
+# The toe of the tendon's curve ends at this fraction of F0 and has this shape; from there the curve continues as its tangent.
 _TOE, _TOE_SHAPE = 0.33, 3.0
-_TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # times the strain
+_TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # at the end, times the strain there
 _TOE_STRAIN = _TENDON_STRAIN * _TOE_SLOPE / (_TOE_SLOPE + 1 - _TOE)
 # Equilibrium fibre lengths [l0] are sought between the first two, in steps of at most the third.
 _SHORTEST, _LONGEST, _STEP = 0.1, 3.0, 0.0075
@@ -37,7 +37,7 @@ class Hill(Record):
 
     ``max_force``: F0, isometric [N]; ``optimal_length``: l0 of the fibres [mm]; ``slack_length``: of the tendon [mm];
     ``pennation``: the angle of fibres at their optimal length [rad]; ``max_velocity``: of shortening without load [l0 / s];
-    ``curvature``: a / F0 of (5.1).
+    ``curvature``: a / F0 of eq. 5.1.
     """
 
     max_force: Force
@@ -62,7 +62,7 @@ class Hill(Record):
         return tendon((path - along) / self.slack_length - 1)
 
     def imbalance(self, path: float, fibre: float, activation: float) -> float:
-        """The force [F0] of fibres at zero velocity along the tendon, minus the force of the tendon."""
+        """The component [F0] along the tendon of the fibres' force at zero velocity, minus the force of the tendon."""
         return (activation * active(fibre) + passive(fibre)) * self.cosine(fibre) - self.tendon_force(path, fibre)
 
     def static(self, path: float, activation: float) -> tuple[float, float]:
@@ -118,7 +118,7 @@ class Hill(Record):
 
 
 class HillSettings(Record):
-    """Settings for lines that are modelled as equal Hill-type muscles with tendons, in equilibrium at each frame (5.1).
+    """Settings for lines that are modelled as equal Hill-type muscles with tendons, in equilibrium at each frame (section 5.1).
     ``max_force``: the total of all lines. ``fibre_share``: the optimal fibre length of a line divided by its length at the first
     frame, at which its tendon is just slack. ``pennation``: the angle between fibres and tendon. ``activation``: from 0 to 1.
     """
@@ -143,7 +143,7 @@ class HillSettings(Record):
 
 
 def active(fibre: float) -> float:
-    """The greatest contractile force [F0] at a ``fibre`` length [l0]: 1 at the optimal length."""
+    """The contractile force [F0] at full activation and a ``fibre`` length [l0]: 1 at the optimal length."""
     return math.exp(-((fibre - 1) ** 2) / _WIDTH)
 
 
@@ -153,7 +153,7 @@ def passive(fibre: float) -> float:
 
 
 def tendon(strain: float) -> float:
-    """The force [F0] of the tendon: 0 if it is slack, then an exponential toe, then a straight line with the slope at its end."""
+    """The force [F0] of the tendon: 0 if it is slack, then an exponential toe, then the tangent at the end of the toe."""
     if strain <= 0:
         return 0.0
     if strain <= _TOE_STRAIN:
@@ -167,7 +167,7 @@ def _strain(force: float) -> float:
 
 
 def inverse_hyperbola(force: float, curvature: float) -> float:
-    """The shortening velocity, relative to its maximum, at a ``force`` relative to the maximum isometric force: (5.1) solved for v.
+    """The shortening velocity, relative to its maximum, at a ``force`` relative to the isometric force: eq. 5.1 solved for v.
 
     In lengthening the force rises to 1.4 along a hyperbola that is twice as steep at 0 (Thelen 2003). Tangents continue both curves
     beyond their ends.

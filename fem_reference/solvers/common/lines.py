@@ -29,12 +29,12 @@ class CurvePoint(Record):
 
 
 class Via(Record):
-    """A point of every fibre, which moves with a ``bone``. ``at``: its place at rest, as a fraction of the fibre's length.
+    """A point of every fibre, which moves with a ``bone``. ``at``: its position at rest, as a fraction of the fibre's length.
 
-    ``within``: the least and the greatest angle of the ``joint`` at which lines pass through the point; at other angles they omit
+    ``within``: the minimum and maximum angle of the ``joint`` at which lines pass through the point; at other angles they omit
     it. ``curve``: its positions on the bone at some angles of the joint, the same for all fibres. Between these angles the point
-    moves along Catmull-Rom splines, with the slopes of parabolas through neighbouring positions; beyond the ends it stays at the
-    last position. ``at`` then only determines the order of the points.
+    moves along Catmull-Rom splines, with the slopes of parabolas through neighbouring positions; beyond them it stays at the
+    first or last position. ``at`` then only determines the order of the points.
     """
 
     at: Annotated[float, Field(gt=0, lt=1)]
@@ -48,10 +48,10 @@ class Via(Record):
         if (self.joint is None) == (self.within is not None or bool(self.curve)):
             raise ValueError('"joint" together with "within" or "curve", and only then')
         if self.within is not None and not self.within[0] < self.within[1]:
-            raise ValueError('"within" from an angle to a greater one')
+            raise ValueError('"within" from an angle to a larger angle')
         angles = [point.angle for point in self.curve]
         if len(angles) == 1 or angles != sorted(set(angles)):
-            raise ValueError('"curve" of at least two points, by growing angle')
+            raise ValueError('"curve" of at least two points, in order of increasing angle')
         return self
 
 
@@ -80,7 +80,7 @@ class Guided:
 @dataclass(frozen=True, eq=False)
 class Passed:
     """The points (k, q + 1, 3) [mm] on k lines at a frame, each on the bone ``on`` (k, q + 1), with q parts between them, counted
-    line by line. Point j of the fibres is on part ``part[j]`` after the share ``share[j]`` of its length.
+    line by line. Point j of the fibres is on part ``part[j]``, at the fraction ``share[j]`` of its length.
     """
 
     points: Floats
@@ -91,9 +91,9 @@ class Passed:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """A line for each of k fibres of ``sizes`` (k,) points, in p parts between fixed points at the shares ``places`` of its length.
+    """A line for each of k fibres of ``sizes`` (k,) points: p parts between fixed points at the fractions ``places`` of its length.
 
-    ``fixed`` (k, p + 1, 3) [mm] at rest, each on ``bones[on]``, on (k, p + 1); ``guided``: points that depend on a joint.
+    ``fixed`` (k, p + 1, 3) [mm]: positions at rest, on ``bones[on]``, on (k, p + 1); ``guided``: points that depend on a joint.
     """
 
     bones: tuple[Bone, ...]
@@ -117,9 +117,9 @@ class Lines:
 
 
 def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: str) -> Lines:
-    """The lines of a muscle through ``vias`` or ``spread`` points; InputError below ``place`` if the muscle lacks them."""
+    """The lines of a muscle through ``vias`` or ``spread`` points; InputError below ``place`` if the muscle cannot have them."""
     fibres, sizes, count = problem.fibres, np.diff(problem.fibres.offsets), len(vias) + spread
-    if sizes.min() < count + 2:  # before anything is spread, as a number of points may be any number
+    if sizes.min() < count + 2:  # checked first, as ``spread`` may be too large for memory
         got = f"fibre {sizes.argmin()} of {sizes.min()} points"
         want = f"fibres of at least {count + 2} points for {count} via-points"
         raise InputError(join(place, "via_count" if spread else "via"), got, want)
@@ -139,7 +139,7 @@ def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: 
 
 
 def along(points: Floats, places: list[float]) -> Floats:
-    """The points (k, 3) at the shares ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
+    """The points (k, 3) at the fractions ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     wanted = np.array(places) * travelled[-1]
     return np.column_stack([np.interp(wanted, travelled, axis) for axis in points.T])
@@ -147,13 +147,13 @@ def along(points: Floats, places: list[float]) -> Floats:
 
 @lru_cache(maxsize=64)
 def _layout(sizes: tuple[int, ...], places: tuple[float, ...]) -> tuple[Ints, Floats]:
-    """The part that contains each point of lines of these ``sizes``, counted line by line, and the share of the part before it."""
+    """The part with each point of lines of these ``sizes``, counted line by line, and the fraction of the part before the point."""
     part, share = zip(*(_spread(size, list(places)) for size in sizes), strict=True)
     return np.concatenate([found + i * (len(places) - 1) for i, found in enumerate(part)]), np.concatenate(share)
 
 
 def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
-    """The part and the share in it (count,) of each point of a line: fixed points, and the others evenly between them."""
+    """The part of each point (count,) of a line and the fraction of it before the point; points lie evenly between fixed points."""
     at = np.rint(np.array(places) * (count - 1)).astype(np.int64)
     steps = np.arange(len(at))
     at = np.maximum.accumulate(at - steps) + steps  # each at least one point after the previous one

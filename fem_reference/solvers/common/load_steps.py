@@ -29,7 +29,7 @@ class Attempt:
         return self.status == "converged"
 
     def refused(self, why: Trouble) -> "Attempt":
-        """The converged attempt as a failure, as a check refuses its state."""
+        """This converged attempt as a failure, because a check refuses its state."""
         return replace(self, status=why.status, detail=f"Newton's method converged, but {why.sentence}")
 
 
@@ -50,7 +50,7 @@ class Step:
 
 @dataclass(frozen=True)
 class StepSizes:
-    """The ``first`` load step, and its least and greatest size, in frame numbers; a step ends at each of ``stops``, in order."""
+    """The sizes of the ``first``, smallest and largest load step, in frame numbers; a step ends at each of ``stops``, in order."""
 
     first: float
     smallest: float

@@ -28,7 +28,7 @@ CONVENTIONS = {
 
 
 def write(problem: MuscleProblem, folder: Path, of: Mapping[str, str]) -> None:
-    """Write the export of a ``problem``, except its documentation, into ``folder``; ``of``: facts that identify its case."""
+    """Write the export of a ``problem``, without documentation, into ``folder``; ``of``: facts that identify its case."""
     (folder / "bones").mkdir()
     files.write_surface(folder / "muscle.ply", problem.surface, problem.surface.points)
     for bone, name in zip(problem.bones, bone_files(problem), strict=True):
@@ -44,7 +44,7 @@ def write(problem: MuscleProblem, folder: Path, of: Mapping[str, str]) -> None:
 
 
 def bone_files(problem: MuscleProblem) -> list[str]:
-    """The file of each bone: numbered, as its name may be any text."""
+    """The file of each bone: numbered, as the name of a bone may be any text."""
     return [f"bones/{i}.ply" for i in range(len(problem.bones))]
 
 
@@ -65,15 +65,15 @@ def _write_tables(problem: MuscleProblem, folder: Path) -> None:
 
 
 def write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[object]]) -> None:
-    """Write a table with the names of its ``columns`` above."""
+    """Write a table, headed by the names of its ``columns``."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([columns, *entries])
     files.write_text(path, text.getvalue())
 
 
 def facts(problem: MuscleProblem) -> dict[str, Any]:
-    """The facts that mesh files lack: units, conventions, frames, bones, attachments, names of regions (shares are in the files of
-    tets), effects with the unit of every parameter.
+    """The facts that mesh files lack: units, conventions, frames, bones, attachments, names of regions (their shares are in the
+    files of tets), and effects with the unit of every parameter.
     """
     contact = problem.contact
     bones = [
@@ -119,7 +119,7 @@ def _effect(effect: Effect) -> dict[str, Any]:
 
 
 def write_lines(path: Path, lines: Polylines) -> None:
-    """The polylines as legacy VTK in text, coordinates in full."""
+    """Write the polylines as legacy VTK text, with coordinates in full precision."""
     ends = lines.offsets.tolist()
     cells = [" ".join(map(str, (b - a, *range(a, b)))) for a, b in pairwise(ends)]
     head = ["# vtk DataFile Version 3.0", "fibres at rest, mm", "ASCII", "DATASET POLYDATA"]

@@ -1,4 +1,4 @@
-"""Programs of other people as subprocesses: their time and memory, a time limit, and the end of all processes that they start."""
+"""Programs of other people as subprocesses: their time and memory, a time limit, and the end of every process that they start."""
 
 import os
 import shutil
@@ -18,7 +18,7 @@ from fem_reference.runs.contents import Status
 
 # The ratio of the limit of clock time to the limit of processor time: beyond this the machine is too busy, or the program waits.
 CLOCK = 10
-# The time between two checks of a program: a share of its time so far, between a least and a greatest time [s].
+# The time between two checks of a program: a fraction of the clock time so far, but within two limits [s].
 _SHARE, _GLANCES = 0.05, (0.05, 1.0)
 _TAIL = 4096  # the number of bytes that are read from the end of a program's output
 
@@ -74,7 +74,7 @@ def run(words: list[str], directory: Path, time_limit: float) -> Ended:
 
 @contextmanager
 def _started(words: list[str], directory: Path, printed: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
-    """The process, in its own session, which ends here with all its processes."""
+    """A context with the process, in its own session; at the end of the context all processes of this session are killed."""
     process = subprocess.Popen(
         words, cwd=directory, stdin=subprocess.DEVNULL, stdout=printed, stderr=printed, start_new_session=True
     )
@@ -98,7 +98,7 @@ def _kill(process: int) -> None:
 
 class _Watch:
     """A thread that kills a ``process`` that takes more than ``limit`` [s]; ``overran``: the reason, if it was killed; ``memory``
-    [MB]: the greatest peak of its processes (the peak in ``os.wait4`` begins with the memory of the process that starts them).
+    [MB]: the maximum peak of its processes (the peak in ``os.wait4`` includes the memory of the process that starts them).
     """
 
     def __init__(self, process: int, limit: float) -> None:

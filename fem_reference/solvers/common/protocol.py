@@ -29,7 +29,7 @@ type CheckProblem[S: Record] = Callable[[S, Any, str], None]
 
 
 class TableRow(NamedTuple):
-    """A row of the page table-5-1: a solver's ``name`` in a ``kind``; ``settings``, as in scene files, for every scene."""
+    """A row of the page table-5-1: its ``name``, its ``kind`` in the report's table, and the ``settings`` for every scene."""
 
     kind: str
     name: str
@@ -41,9 +41,9 @@ class Solver[P, S: Record]:
     """The record in which a solver's file offers ``solve`` for one task.
 
     ``settings``: the record of its settings. ``example``: some of them, as scene files write them, for contract tests.
-    ``require``: raises MissingSoftware if software for such settings is not installed. ``check_problem``: for settings that refer
-    to the contents of a case. ``slow``: True if it takes more than a few seconds on a small problem. ``go_on``: for slow solvers,
-    continues a run; all others begin again from rest. ``table``: its rows of the page table-5-1.
+    ``require``: raises MissingSoftware or InputError if software for the settings is missing. ``check_problem``: for settings that
+    refer to the contents of a case. ``slow``: True if it takes more than a few seconds on a small problem. ``go_on``: for slow
+    solvers, continues a run; all others begin again from rest. ``table``: its rows of the page table-5-1.
     """
 
     task: ClassVar[Task]
@@ -63,7 +63,7 @@ class Solver[P, S: Record]:
         return self.settings
 
     def fills(self, settings: S) -> bool:  # noqa: ARG002
-        """True if it needs a meshed problem."""
+        """True if the solver needs a meshed problem."""
         return True
 
     def run(self, problem: P, settings: S) -> Run:
@@ -76,9 +76,9 @@ class Solver[P, S: Record]:
 @dataclass(frozen=True, kw_only=True)
 class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
     """A solver of muscles. ``moves``: the carrier of its unknowns, whose mesh determines accuracy and cost; ``check_effects``: None
-    unless it simulates the effects of a scene; ``fibres``: True if a surface solver needs fibres under such settings; otherwise it
-    receives a ``Setup``, without tetrahedra in the muscle. ``depends_on``: the order of vertices or the size of the muscle, if its
-    result depends on these.
+    unless it simulates the effects of a scene; ``fibres``: True if a surface solver with these settings needs fibres; otherwise it
+    receives a ``Setup``, without tetrahedra in the muscle. ``depends_on``: the order of vertices or the size of the muscle, if the
+    result depends on it.
     """
 
     task = "solve"
@@ -90,11 +90,11 @@ class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
     fibres: Callable[[S], bool] = lambda _: False
 
     def moved(self, settings: S) -> Moves:  # noqa: ARG002
-        """The carrier of its unknowns under such settings."""
+        """The carrier of the unknowns with these settings."""
         return self.moves
 
     def fills(self, settings: S) -> bool:
-        """True if it needs the muscle filled with tetrahedra and fibres."""
+        """True if the solver needs the muscle filled with tetrahedra and fibres."""
         return self.moves not in ("surface", "nothing") or self.fibres(settings)
 
 
@@ -120,7 +120,7 @@ AnySolver = Solver[Any, Any]
 @dataclass(frozen=True)
 class Trade:
     """Marks a settings key that trades time for accuracy: a ``ladder`` of useful values, as scene files write them, from the
-    fastest to the most accurate. Some may be refused: elements for other cells or other effects.
+    fastest to the most accurate. Some values may be refused for a scene, such as elements for other cells or effects.
     """
 
     ladder: tuple[float | str, ...]

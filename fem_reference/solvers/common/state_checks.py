@@ -19,7 +19,7 @@ _LARGE = 5.0
 
 @dataclass(frozen=True)
 class Trouble:
-    """The status with which a state ends a run, and its defect."""
+    """The ``status`` with which a state ends a run, and a ``sentence`` on its defect."""
 
     status: Status
     sentence: str
@@ -45,8 +45,8 @@ class SurfaceCheck:
         self.width, self.volume = diagonal(rest.points), enclosed_volume(rest.points, rest.triangles)
 
     def trouble(self, state: Floats, /) -> Trouble | None:
-        """Diverged if a position is not a number, or the surface is much larger than at rest, or much wider than at rest and than
-        the distance of its attached vertices; inverted if it is turned inside out.
+        """Diverged if a position is not a number, the volume is much larger than at rest, or the surface is much wider than at rest
+        and than the extent of its attached vertices; inverted if the surface is turned inside out.
         """
         lost = np.flatnonzero(~np.isfinite(state).all(axis=1))
         if len(lost):

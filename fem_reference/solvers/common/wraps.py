@@ -63,7 +63,7 @@ class ObstacleOn(Record):
         return next(key for key, given in self if key != "bone" and given is not None)
 
     def surface(self) -> Quadric | Ring:
-        """Its surface at rest."""
+        """The surface of the obstacle at rest."""
         if (ball := self.sphere) is not None:
             return Quadric(_pose(Rotation.identity(), ball.centre), np.full(3, ball.radius))
         if (roll := self.cylinder) is not None:
@@ -78,7 +78,7 @@ class ObstacleOn(Record):
 
 @dataclass(frozen=True, eq=False)
 class Wraps:
-    """The obstacles ``given`` on ``bones``; a sphere or a cylinder alone has a closed form."""
+    """The obstacles ``given`` on ``bones``. If there is only one, a sphere or a cylinder, paths have a closed form."""
 
     given: tuple[ObstacleOn, ...]
     bones: tuple[Bone, ...]
@@ -94,7 +94,7 @@ class Wraps:
         return winding.around(moved, starts, ends)
 
     def inside(self, fixed: Floats, number: int) -> tuple[str, str]:
-        """The key of the obstacle with the deepest fixed point inside, its depth and line in words; empty if none is inside."""
+        """The key of the obstacle with the deepest fixed point, and its line and depth in words; empty if no point is inside."""
         found = []
         for i, surface in enumerate(self._moved(number)):
             points = fixed.reshape(-1, 3)
@@ -111,7 +111,7 @@ class Wraps:
 
 
 def wraps_of(problem: MuscleProblem, given: tuple[ObstacleOn, ...], place: str) -> Wraps:
-    """The obstacles of a muscle; InputError below ``place`` if there is no such bone."""
+    """The obstacles of a muscle; InputError below ``place`` if the bone of an obstacle does not exist."""
     bones = [index(problem.bones, one.bone, join(place, f"obstacle[{i}].bone")) for i, one in enumerate(given)]
     return Wraps(given, tuple(problem.bones[i] for i in bones))
 

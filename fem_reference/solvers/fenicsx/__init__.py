@@ -1,7 +1,7 @@
 """The reference: P2 displacement, P1 pressure (Taylor-Hood) on tetrahedra, quasi-static, solved by Newton's method in FEniCSx.
 
-This module needs no FEniCSx. ``session`` runs ``worker`` in a subprocess (``mpiexec`` for more than one rank), passes the problem
-as a file, and passes frames on as the worker reports them. A worker that dies gives the status *crashed*, not an exception.
+This module needs no FEniCSx. ``session`` runs ``worker`` in a subprocess (``mpiexec`` for more than one rank), gives it the problem
+as a file, and passes on each frame that it reports. A worker that dies gives the status *crashed*, not an exception.
 """
 
 import logging
@@ -47,7 +47,7 @@ __all__ = ["BodySettings", "FieldSettings", "Settings", "session", "shared", "so
 
 
 def require(settings: BodySettings | FieldSettings) -> None:
-    """Raise MissingSoftware if FEniCSx is not installed or the requested ranks cannot be started."""
+    """Raise MissingSoftware if FEniCSx or the ``mpiexec`` for the ranks is missing, InputError for too many ranks."""
     require_installed()
     if isinstance(settings, Settings):
         command_line(settings.ranks or 1)
@@ -75,7 +75,7 @@ def go_on(problem: AnyMuscle, settings: Settings, sink: Sink, cut_off: CutOff) -
     """Continue from the last stored frame of a run that was cut off, and delete earlier states that are not used again."""
     require(settings)
     there = kept(cut_off, problem.body)
-    again = settings.reuse and not _has_steps(problem)  # whether earlier states are used again
+    again = settings.reuse and not _has_steps(problem)  # True if earlier states may be used again
     if there.frames:
         log.info("an earlier run was interrupted; continuing from its stored frames, up to frame %d", there.frames[-1])
 
@@ -113,7 +113,7 @@ class _Describe(Protocol):
 
 
 def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
-    """A function that describes a frame. For several muscles, the names of scalars begin with the name of the muscle and a dot."""
+    """A function that adds a note and scalars to a frame; with several muscles, a scalar is named ``<muscle>.<scalar>``."""
     if isinstance(problem, MuscleProblem):
         return partial(_described, problem, loads=_are_known(problem, settings))
     spans, names = problem.spans, tuple(problem.problems)
@@ -169,8 +169,8 @@ def _loads(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
 
 
 def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: bool) -> Frame:
-    """The frame with a note and more scalars: the magnitudes [N, N mm] of each force and of the sum over all constraints, the
-    ``loads`` if they are known, and the stresses.
+    """The frame with a note and more scalars: the magnitudes [N, N mm] of each force and of the sums of forces and of moments, the
+    forces on bones, the ``loads`` if they are known, errors of attachments, and stresses.
     """
     scalars = frame.scalars
     smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])
@@ -209,8 +209,8 @@ def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> 
 
 def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
     """The distance between attached surface vertices and their targets on the bones, ``attachment_error_rms`` and
-    ``attachment_error_max`` [mm]. The distance is not zero, as exact attachments are facets of tets, which cover the vertices only
-    roughly, and springs yield. Empty if nothing is attached.
+    ``attachment_error_max`` [mm]. The distance is not zero, as springs yield, and exact attachments are facets of tets, which
+    follow the vertices only approximately. Empty if nothing is attached.
     """
     surface = frame.surface
     if not problem.attached or surface is None:

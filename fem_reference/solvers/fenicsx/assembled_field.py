@@ -21,7 +21,7 @@ from dolfinx.fem.petsc import apply_lifting, assemble_matrix, assemble_vector, s
 from mpi4py import MPI  # isort: skip
 from fem_reference.solvers.fenicsx import compiling, meshes  # isort: skip
 
-QUADRATURE_DEGREE = 8  # the rules of scikit_fem; on the boundary it has 3 points
+QUADRATURE_DEGREE = 8  # as in scikit_fem, which uses 3 points on the boundary
 FACET_DEGREE = 5
 
 
@@ -93,14 +93,14 @@ def _state(function: Any) -> FieldState:
 
 
 def _by_cell(msh: mesh.Mesh, values: Floats) -> fem.Function:
-    """The function that is constant on each cell, with the problem's ``values`` (m,) by cell."""
+    """The function that is constant on each cell, with the ``values`` (m,) of the problem's cells."""
     function = fem.Function(fem.functionspace(msh, ("Discontinuous Lagrange", 0)))
     function.x.array[function.function_space.dofmap.list[:, 0]] = values[msh.topology.original_cell_index]
     return function
 
 
 def _assembled(left: Any, right: Any, space: Any, fixed: Floats) -> tuple[Any, Any]:
-    """Matrix and right-hand side; the equation of an unknown with a ``fixed`` (N,) value, NaN if free, sets it to that."""
+    """Matrix and right-hand side; an unknown with a value in ``fixed`` (N,), which is NaN for free unknowns, is set to it."""
     values = fem.Function(space)
     values.x.array[:] = np.nan_to_num(fixed)
     conditions = [fem.dirichletbc(values, np.flatnonzero(~np.isnan(fixed)).astype(np.int32))]

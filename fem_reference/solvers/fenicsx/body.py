@@ -39,17 +39,17 @@ from fem_reference.solvers.fenicsx.validity import Validity
 
 
 class AssembledBody:
-    """The unknowns of a body, made of an element of ``ELEMENTS``, and their equations."""
+    """The unknowns of a body with an element of ``ELEMENTS``, and their equations."""
 
     def __init__(self, body: Body, settings: BodySettings) -> None:
         self.comm, self.reuse, self.effects = MPI.COMM_WORLD, settings.reuse and not body.remembers, body.effects
         changed = (isinstance(one, Energy) and (isinstance(one, Ramped) or not one.stored) for one in self.effects)
         self.conserves = not any(changed)  # True if the energy changes only as the body deforms
-        self.judged = False  # True once its energy gap counts: before, a halfway state is not worth its cost
+        self.judged = False  # True if the energy gap is judged; if not, a halfway state is not worth its cost
         self.mesh = meshes.distribute(self.comm, body.mesh)
         count = self.mesh.topology.index_map(3).size_local
         self.cells = np.asarray(self.mesh.topology.original_cell_index, np.int64)[:count]
-        self.local = np.full(len(body.mesh.cells), -1)  # this rank's number of each cell of the body, else -1
+        self.local = np.full(len(body.mesh.cells), -1)  # this rank's index of each cell of the body, -1 on other ranks
         self.local[self.cells] = np.arange(len(self.cells))
         self.unknowns = meshes.unknowns(self.mesh, settings.element)
         self.displacement = Displacement(self.unknowns)
@@ -173,8 +173,8 @@ class AssembledBody:
         self.go_back(before)
 
     def recall(self, frame: float) -> bool:
-        """Restore an earlier state with the same loads and boundary conditions as at ``frame``, if there is one on the path (after
-        a full turn the loads are the loads at rest, but the state is another). Its residual proves the equilibrium.
+        """Restore an earlier state with the same loads and boundary conditions as at ``frame``, if there is one and no jump leads
+        to it (after a full turn the loads are those at rest, but the state is another). Its residual proves the equilibrium.
         """
         if self.clock.matters or not self.reuse:
             return False
@@ -214,7 +214,7 @@ class AssembledBody:
         if self.contact:
             self.contact.update(frame)
         self.arrive(frame)
-        if not recalled and self.stability is not None:  # an old factorisation remains in use
+        if not recalled and self.stability is not None:  # makes the factorisation that the linear solver then uses
             with self.clock.slow(np.array(self.unknowns.x.array)):
                 self.stability.negative_modes()
 
@@ -265,7 +265,7 @@ class AssembledBody:
         return modes
 
     def modes_of_material(self) -> float:
-        """The number of negative modes of the present state that the material has for certain."""
+        """The number of negative modes of the present state that the material certainly has."""
         assert self.stability is not None  # modes have been counted
         with self.clock.slow(np.array(self.unknowns.x.array)):
             return self.stability.of_material()

@@ -65,7 +65,7 @@ class PrescribedRegion:
 
 
 class PointSprings:
-    """A ``Prescribed`` condition by springs at ``points`` of this rank's cells. Points are not unknowns, so it is never exact."""
+    """A ``Prescribed`` condition by springs at ``points`` of this rank's cells; never exact, as points are not unknowns."""
 
     exact: Ints = np.zeros(0, np.int64)
 
@@ -74,7 +74,7 @@ class PointSprings:
         self.entry, self.unknowns, self.points = entry, unknowns, points
         self.along = along = np.isin(np.arange(3), entry.components)
         self.stiffness = entry.stiffness * points.areas[:, None] * along  # [N/mm]
-        self.ends = self.wanted = np.array(points.rest)  # of the springs' other ends, at rest
+        self.ends = self.wanted = np.array(points.rest)  # the other ends of the springs, at rest
 
     @property
     def prescribed(self) -> Floats:
@@ -109,8 +109,8 @@ class PointSprings:
 
 
 class Tendons(PointSprings):
-    """Straight lines from ``points`` of this rank's cells to the anchor of a ``Prescribed``, which its path moves. Each line pulls
-    with its stiffness times its extension ``l - l0``, and not at all when slack.
+    """Straight lines from ``points`` of this rank's cells to the anchor of a ``Prescribed``, which moves along its path. Each line
+    pulls with its stiffness times its extension ``l - l0``, and not at all if it is slack.
     """
 
     def __init__(self, unknowns: fem.Function, entry: Prescribed, points: ContactPoints) -> None:

@@ -13,7 +13,7 @@ from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 
 class Patches:
     """The points of each of p cells. A point moves at most ``spread`` (p,) times as far as the k nodes of its cell: the sum of the
-    magnitudes of their basis functions there. If these do not give the rest position, a rotation adds at most ``off`` (p,) [mm].
+    magnitudes of basis functions. If these do not reproduce its rest position, rotations add at most ``off`` (p,) [mm].
     """
 
     def __init__(self, points: ContactPoints) -> None:
@@ -36,9 +36,9 @@ class Patches:
 
 
 class Nearby:
-    """Finds the points within ``reach`` [mm] of a bone of a ``shape``, and perhaps some more. For each patch it keeps the clearance
-    ``free`` (p,) [mm] of its points and the positions ``seen`` (p, k, 3) of its nodes at the last search, in the bone's frame, and
-    whether a search has examined its points since the last converged state (``met``).
+    """Finds the points within ``reach`` [mm] of a bone of a ``shape``, and perhaps some more. For each patch it stores, from the
+    last search that examined its points, their clearance ``free`` (p,) [mm] and the positions ``seen`` (p, k, 3) of its nodes in
+    the bone's frame; ``met`` (p,): True if there was such a search since the last converged state.
     """
 
     def __init__(self, shape: Obstacle, reach: float, patches: Patches) -> None:
@@ -68,8 +68,8 @@ class Nearby:
         self, before: Callable[[Ints], Floats], after: Callable[[Ints], Floats]
     ) -> tuple[Ints, Floats, Floats]:
         """The points (n,) whose straight path since the last converged state may have come within reach, and the ends (n, 3) of
-        the path, which ``before`` and ``after`` give for any points. A patch that was not examined since then, and the paths of its
-        points, lie in a sphere clear of the bone.
+        the path, which ``before`` and ``after`` give for any points. A patch that was not examined since then lies, with the paths
+        of its points, in a sphere clear of the bone.
         """
         points, _ = self.patches.points(np.flatnonzero(self.met))
         starts, ends = before(points), after(points)

@@ -1,9 +1,9 @@
 /* Residual and tangent of an energy per rest volume, cell by cell: the sums over quadrature points of finite elements.
 
    The caller gives the first and second derivatives of the energy at the points; here they are combined with the element's basis.
-   Variables at a point, in this order: by component i of the displacement its derivatives along x, y, z and, where KINDS is 4, the
-   displacement itself; then, where there are PRESSURES, the pressure. Derivatives are given as the VARIABLES first ones, then the
-   upper triangle of the second ones, row by row.
+   Variables at a point, in this order: for each component i of the displacement its derivatives along x, y, z and, if KINDS is 4,
+   the component itself; then, if there are PRESSURES, the pressure. The given derivatives of the energy are the VARIABLES first
+   derivatives, then the upper triangle of the second derivatives, row by row.
 
    Unknowns of a cell, in this order: component by component of the displacement its NODES, then the PRESSURES.
 
@@ -28,7 +28,7 @@ typedef struct { /* the element at its quadrature points */
 /* The index of the second derivative with respect to variables v and w, v <= w. */
 static inline int second(int v, int w) { return VARIABLES + v * VARIABLES - v * (v - 1) / 2 + w - v; }
 
-/* The variables of a component as functions of its nodes (ROWS), and the weights (POINTS) by rest volume of a cell at x. */
+/* The ROWS that give the variables of a component from its nodes, and the weights (POINTS) times rest volume, of a cell at x. */
 static void basis(const Element *e, const double *x, vector (*rows)[WIDE], double *weights)
 {
     for (int q = 0; q < POINTS; q++) {

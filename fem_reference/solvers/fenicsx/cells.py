@@ -44,8 +44,8 @@ class Tangent:
 
 
 class CellSums:
-    """Sums over this rank's own cells. ``unknowns`` (m, u): by cell, the displacement component by component, then the pressures;
-    ``structure``: the sparsity of the tangent.
+    """Sums over the cells that this rank owns. ``unknowns`` (m, u) of each cell: the displacement component by component, then the
+    pressures; ``structure``: the sparsity of the tangent.
     """
 
     def __init__(self, form: Form) -> None:
@@ -67,7 +67,7 @@ class CellSums:
         self.projection = self._projection() if is_stabilised(element) else None
 
     def structure(self) -> Structure:
-        """The sparsity of the entries of cells, extended by the whole diagonal."""
+        """The sparsity of the entries of cells, extended by the full diagonal."""
         starts = np.arange(0, self.unknowns.size + 1, self.unknowns.shape[1])
         entries = np.ones(self.unknowns.size, bool), self.unknowns.ravel(), starts
         has = csr_array(entries, shape=(self.count, self.size))
@@ -76,7 +76,7 @@ class CellSums:
         return Structure(found.indptr.astype(np.int32), found.indices.astype(np.int32))
 
     def places(self, structure: Structure, fixed: NDArray[np.bool_]) -> Places:
-        """The places of each cell's entries (m, u, u) in ``structure``, one past the last for those of ``fixed`` (n,) unknowns."""
+        """The indices (m, u, u) of each cell's entries in ``structure``; one past the last for those of ``fixed`` (n,) unknowns."""
         found = np.empty((*self.unknowns.shape, self.unknowns.shape[1]), np.int32)
         arrays: tuple[NDArray[Any], ...] = self.unknowns, structure.starts, structure.columns, fixed.view(np.int8)
         size = ctypes.c_int(len(structure.columns))
@@ -123,7 +123,7 @@ class CellSums:
         self.code.add_points(ctypes.c_long(len(cells)), *map(_address, arrays))
 
     def softness(self) -> Floats:
-        """The mass matrix (m, p, p) of the pressures, by cell [mm3/MPa], weighted with ``1 / (2 mu) + 1 / K``: K is the bulk
+        """The mass matrix (m, p, p) [mm3/MPa] of the pressures of each cell, weighted with ``1 / (2 mu) + 1 / K``: K is the bulk
         modulus, and mu the shear stiffness, the mean diagonal of the energy's second derivatives.
         """
         rows, basis = self._diagonal(), self._pressures()
@@ -142,7 +142,7 @@ class CellSums:
         return -float(np.einsum("mc,mcd,md->", values, self.projection, values)) / 2
 
     def _projection(self) -> Floats:
-        """The second derivative (m, p, p), by cell [mm3/MPa], of minus the energy of ``body.is_stabilised``, at rest."""
+        """The second derivative (m, p, p) [mm3/MPa] of minus the energy described at ``body.is_stabilised``, at rest."""
         rows, basis = self._diagonal(), self._pressures()
         shear = [rows[i * self.form.kinds + k] for i in range(3) for k in range(3) if i != k]
         found = np.empty((self.count, basis.shape[1], basis.shape[1]))
@@ -155,7 +155,7 @@ class CellSums:
         return found
 
     def _diagonal(self) -> list[int]:
-        """The places of the diagonal second derivatives among the derivatives at a point."""
+        """The indices of the diagonal second derivatives among the derivatives at a point."""
         count = 3 * self.form.kinds + 1
         return [count + v * count - v * (v - 1) // 2 for v in range(count)]
 
@@ -164,7 +164,7 @@ class CellSums:
         return self.kept[4].reshape(-1, self.unknowns.shape[1] - 3 * self.nodes)
 
     def _parts(self) -> Iterator[tuple[slice, Floats, Floats]]:
-        """First and second derivatives of the energy at points (m, q, v) and their volumes (m, q) [mm3], by chunks of cells."""
+        """For each chunk its cells, the energy's first and second derivatives at points (m, q, v) and volumes (m, q) [mm3]."""
         for some in self._chunks():
             cells = np.arange(some.start, some.stop, dtype=np.int32)
             slopes = np.einsum("mgi,qgr->mqir", self.corners[some], self.kept[1])
@@ -179,8 +179,8 @@ class CellSums:
 
 
 def _without_pressure(values: Floats, others: int) -> Floats:
-    """First derivatives with respect to the ``others`` and the pressure, and the upper triangle of the second derivatives, (...,
-    v). The stiffness by the pressure, K cof F x cof F, replaces the terms that couple the pressure with the others.
+    """The derivatives ``values`` (..., v), first and upper triangle of the second, once the pressure follows the volume: its
+    stiffness, K cof F x cof F, replaces the terms that couple it with the ``others`` (the number of other variables).
     """
     values, (rows, columns) = values.copy(), np.triu_indices(others + 1)
     second, last = values[..., others + 1 :], columns == others

@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx.forms import TimeStep
 
-# The duration, as a share of all frames, for which forces act on a body at rest to find its initial acceleration.
+# The time for which forces act on a body at rest to find its initial acceleration, as a fraction of the time of all frames.
 _INSTANT = 1e-7
 
 
@@ -56,7 +56,7 @@ class Clock:
         self._set(unknowns, self._seconds(_INSTANT * self.whole))
 
     def begin(self, unknowns: Floats) -> None:
-        """End that step with ``unknowns``: velocities are 0, and accelerations are now known."""
+        """End the step that ``instant`` started, with ``unknowns``: velocities are 0, and accelerations are now known."""
         assert self.step is not None  # there is momentum
         moved = unknowns - self.step.before.x.array
         self.acceleration, self.resting = self.momentum.begun(moved, 1 / float(self.step.rate.value)), False
@@ -100,7 +100,7 @@ class Clock:
             self.step.velocity.x.array[:] = self.velocity
 
     def _set(self, unknowns: Floats, seconds: float) -> None:
-        assert self.step is not None  # called only with momentum
+        assert self.step is not None  # callers check it, or have momentum
         self.step.before.x.array[:], self.step.rate.value = unknowns, 1 / seconds
         if self.step.predicted is not None:
             moving = unknowns, self.velocity, self.acceleration

@@ -32,7 +32,7 @@ OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's compilation, by one process at a time. A lock per form takes longer: a signature costs more than finding a form."""
+    """FFCx's compilation, by one process at a time. A lock per form would need its signature, which costs more than the search."""
 
     @wraps(compiled)
     def waiting(objects: list[Any], *given: Any, **options: Any) -> R:
@@ -79,7 +79,7 @@ def form(expression: Any) -> Any:
 
 
 class _Code(NamedTuple):
-    """A compiled expression, its ``module``, and the places of the functions and constants that it reads in its formula's lists."""
+    """A compiled expression, its ``module``, and the indices, in its formula's lists, of functions and constants that it reads."""
 
     expression: Any
     module: Any
@@ -113,8 +113,8 @@ def expressions(values: list[Any], points: Any, first: int) -> tuple[Any, Any]:
 
 
 def _bound(value: Any, points: Any, firsts: tuple[int, ...]) -> list[BoundExpression]:
-    """A ``value`` compiled at reference ``points`` (q, 3), once for each number of components in ``firsts``. A formula is
-    differentiated and looked up only once: another body has other functions and constants in the same order.
+    """A ``value`` compiled at reference ``points`` (q, 3): all of it, and its first components for each number in ``firsts``. A
+    formula is differentiated and looked up only once: another body has other functions and constants in the same order.
     """
     functions, constants = extract_coefficients(value), extract_constants(value)
     labels = sorted(extract_type(value, Label), key=Label.count)
@@ -138,7 +138,7 @@ def _code(value: Any, points: Any, functions: list[Any], constants: list[Any]) -
 
 
 class _WithoutVariables(MultiFunction):  # type: ignore[misc]  # UFL has no types
-    """Replaces variables of differentiation by values: UFL numbers them by process, so a compiled form would not be found again."""
+    """Replaces variables of differentiation by values: their numbers differ between processes, and so would forms' signatures."""
 
     expr = MultiFunction.reuse_if_untouched
 

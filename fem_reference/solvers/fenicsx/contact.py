@@ -23,17 +23,17 @@ from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.friction import Friction, Grip
 from fem_reference.solvers.fenicsx.spent import Spent
 
-# A point deeper in a bone than this share of half the bone's thickness counts as having passed through.
+# A point deeper in a bone than this fraction of half the bone's thickness counts as having passed through.
 _GIVEN_WAY = 0.75
-# The straight path of a point that slides round a rim cuts the rim at most this deep, as a share of the half thickness; the
-# smoothing is a bound too.
+# The straight path of a point that slides round a rim cuts the rim to at most this depth, as a fraction of half the thickness, and
+# at most to the depth of the smoothing.
 _RIM = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class Pressed:
-    """Contact with one bone: ``gap`` (m,) [mm], negative inside, of the points ``near`` (m,); no other point is within the
-    smoothing. For the ``pressed`` points (k,) among them it has the ``pressure`` (k,) [MPa per unit rest area], the ``traction``
+    """Contact with one bone: the ``gap`` (m,) [mm], negative inside, of the points ``near`` (m,), which include all points within
+    the smoothing. For the ``pressed`` points (k,) among them: the ``pressure`` (k,) [MPa per unit rest area], the ``traction``
     (k, 3) and its derivative ``slope`` (k, 3, 3) [MPa/mm], both with friction, and the friction's ``grip``.
     """
 
@@ -70,7 +70,7 @@ class ContactForces:
         self.friction, self.dissipated = list[Friction](), 0.0
         self.look()
         self.update(frame)
-        self.overlap = max((float(-one.gap.min(initial=0.0)) for one in self.now), default=0.0)  # the greatest at rest
+        self.overlap = max((float(-one.gap.min(initial=0.0)) for one in self.now), default=0.0)  # maximum at rest
         if law.relaxed:
             for overlap, one in zip(self.overlaps, self.now, strict=True):
                 overlap[one.near] = np.maximum(law.smoothing - one.gap, 0)
@@ -110,25 +110,25 @@ class ContactForces:
         return replace(found, traction=own[0], slope=own[1], grip=grip)
 
     def _held(self, i: int) -> Floats:
-        """The places (n, 3) [mm], in the frame of bone ``i``, of the points that it presses; NaN for all others."""
+        """The positions (n, 3) [mm], in the frame of bone ``i``, of the points that it presses; NaN for all others."""
         found, some = np.full(self.points.rest.shape, np.nan), self.now[i].pressed
         found[some] = self._local(i, self.frame, self.moved, some)
         return found
 
     def _before(self, i: int, which: Ints) -> tuple[Floats, Floats]:
-        """The places (k, 3) [mm] of points ``which`` (k,) in the frame of a bone in the settled state, and their gaps (k,) [mm]."""
+        """The positions (k, 3) and gaps (k,) [mm] of points ``which`` (k,) in the settled state, in the frame of bone ``i``."""
         _, frame, moved = self.settled
         places = self._local(i, frame, moved, which)
         gap = self.bones[i].shape.sample(places).distance
         return places, gap + self.law.allowance(frame) * self.overlaps[i][which]
 
     def _local(self, i: int, frame: float, moved: Floats, some: Ints) -> Floats:
-        """The positions (k, 3) [mm] of ``some`` points (k,) in the frame of a bone at ``frame``, of nodes at ``moved`` (m, 3)."""
+        """The positions (k, 3) [mm] of ``some`` points relative to bone ``i`` at ``frame``, with nodes displaced by ``moved``."""
         pose = self.bones[i].pose(frame)
         return np.asarray((self._places(moved, some) - pose[:3, 3]) @ pose[:3, :3])
 
     def _places(self, moved: Floats, some: Ints) -> Floats:
-        """The positions (k, 3) [mm] of ``some`` points (k,), the nodes being at ``moved`` (m, 3)."""
+        """The positions (k, 3) [mm] of ``some`` points (k,); nodes are displaced by ``moved`` (m, 3)."""
         return np.asarray(self.points.rest[some] + self.points.carried.shares[some] @ moved)
 
     def presses(self) -> bool:
@@ -158,7 +158,7 @@ class ContactForces:
             self.points.add_forces(residual, -self.points.areas[which, None] * found, which)
 
     def tangent(self) -> Iterator[tuple[Ints, Floats, Floats]]:
-        """The derivative of the residual by bone: cells (p,) of pressed points, their basis (p, k), traction slopes (p, 3, 3)."""
+        """The derivative of the residual for each bone: cells (p,), basis (p, k), traction slopes (p, 3, 3) of pressed points."""
         for one in self.now:
             if len(touched := one.pressed):
                 areas = self.points.areas[touched, None, None]
@@ -178,9 +178,9 @@ class ContactForces:
         return found
 
     def scalars(self) -> dict[str, float]:
-        """The greatest ``contact_depth`` [mm], ``contact_pressure`` [MPa] and ``PART.contact_pressure`` of parts; the rest area in
+        """The maxima ``contact_depth`` [mm], ``contact_pressure`` [MPa] and ``PART.contact_pressure`` of parts; the rest area in
         contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, those whose distance was computed;
-        ``overlap_at_rest`` [mm] of the deepest point, removed or not; and ``friction_work`` [N mm], the total dissipated.
+        ``overlap_at_rest`` [mm] of the deepest point, removed or not; and ``friction_work`` [N mm], dissipated since the start.
         """
         comm, touched, depth, pressure = self.comm, np.zeros(len(self.points.areas), bool), 0.0, 0.0
         for one in self.now:
@@ -203,7 +203,7 @@ class ContactForces:
         return found | {name: comm.allreduce(value, MPI.SUM) for name, value in sums.items()}
 
     def deepest(self) -> str:
-        """The depth of the deepest point, its bone and its place, in words."""
+        """The depth of the deepest point, its bone and its position, in words."""
         mine = []
         for entry, one in zip(self.bones, self.now, strict=True):
             if len(one.near):
@@ -253,7 +253,7 @@ class ContactForces:
         for entry, one, before in zip(self.bones, self.now, self.overlaps, strict=True):
             depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))
             half = entry.shape.half_thickness
-            said = f'contact gives way: the surface is {depth:.2g} mm deep in "{entry.name}", whose middle is at {half:.2g} mm'
+            said = f'contact gives way: the surface is {depth:.2g} mm deep in "{entry.name}", whose middle is {half:.2g} mm deep'
             mine += [(depth / half, said)] if depth > _GIVEN_WAY * half else []
         return mine
 
@@ -269,7 +269,7 @@ class ContactForces:
         return mine
 
     def _worst(self, mine: list[tuple[float, str]]) -> str | None:
-        """The sentence with the greatest number among those of all ranks; None if there is none."""
+        """The sentence with the largest number among those of all ranks; None if there is none."""
         found: list[tuple[float, str]] = [one for rank in self.comm.allgather(mine) for one in rank]
         return max(found)[1] if found else None
 
@@ -282,7 +282,7 @@ class ContactForces:
         met, starts, ends = self.nearby[i].crossing(there, here)
         before, now = (self.bones[i].shape.sample(places) for places in (starts, ends))
         displacements = ends - starts
-        # Far away no gap is known: outward is then opposite to the travel at the start, and along the travel at the end.
+        # Far away the gap is unknown: outward is then opposite to the displacement at the start, and along it at the end.
         outward = [
             np.where(one.gradient.any(axis=1)[:, None], one.gradient, sign * displacements)
             for one, sign in ((before, -1), (now, 1))

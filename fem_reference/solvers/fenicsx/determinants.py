@@ -16,7 +16,7 @@ from fem_reference.solvers.fenicsx.meshes import Displacement, geometry
 
 @dataclass(frozen=True)
 class Extreme:
-    """The least or greatest ``value`` over cells, with the ``cell`` of the body and the rest position [mm]. ``where`` names the
+    """The minimum or maximum ``value`` over cells, the ``cell`` of the body and the rest position ``at`` [mm]. ``where`` names the
     kind of point; it is empty for means over cells.
     """
 
@@ -31,7 +31,7 @@ class Extreme:
 
 
 def least(comm: MPI.Comm, values: Floats, cells: Ints, at: Floats, where: str = "", sign: float = 1.0) -> Extreme:
-    """The least ``sign values`` (n, ...) in the ``cells`` (n,) of all ranks, ``at`` places (n, ..., 3); NaN counts as least."""
+    """The minimum of ``sign * values`` (n, ...) over ``cells`` (n,) of all ranks, ``at`` positions (n, ..., 3); NaN is smallest."""
     mine = Extreme(sign * np.inf, where, -1, (0.0, 0.0, 0.0))
     if len(cells):  # a rank may have none
         i = np.unravel_index(np.argmin(np.where(np.isnan(values), -np.inf, sign * values)), values.shape)
@@ -45,10 +45,10 @@ class Determinants:
     """Det F at the quadrature points and the vertices of this rank's cells."""
 
     def __init__(self, displacement: Displacement, cells: Ints, determinant: Any, rule: Floats, kind: Kind) -> None:
-        """``cells``: the number in the body of each cell here; ``rule``: the quadrature points (q, 3) of a ``kind`` of cell."""
+        """``cells``: the index in the body of each cell of this rank; ``rule``: quadrature points (q, 3) of a ``kind`` of cell."""
         self.mesh, self.cells, self.unknowns = displacement.space.mesh, cells, displacement.unknowns.x
         vertices = reference_nodes(kind, 1)
-        # The expression is compiled, as each iteration needs it, by all ranks together, even ranks without cells.
+        # Compiled, as each iteration needs it, and by all ranks together, even ranks without cells.
         self.inside = compiling.expression(determinant, rule)
         self.at_vertices = displacement.tabulated(vertices, len(cells))
         at_vertices, slopes = geometry(self.mesh, vertices, slice(len(cells)))
@@ -66,7 +66,7 @@ class Determinants:
         return None if smallest.value > 0 else Trouble("inverted", f"det F fell to {smallest}")
 
     def smallest_of(self, values: Floats, where: str = "quadrature point") -> Extreme:
-        """The smallest of ``values`` (p,) at points of one kind of this rank's cells, and its place; NaN is smallest."""
+        """The smallest of ``values`` (p,) at the points of one kind in this rank's cells, over all ranks; NaN is smallest."""
         places = self.rest[where]
         return least(self.mesh.comm, values.reshape(places.shape[:2]), self.cells, places, where)
 
@@ -79,7 +79,7 @@ class Determinants:
         return bool(self.mesh.comm.allreduce(bool(good.all()), MPI.LAND))
 
     def _at(self, where: str) -> Floats:
-        """Det F by cell of this rank and by point of one kind."""
+        """Det F for each cell of this rank and each point of one kind."""
         if len(self.cells) == 0:
             return np.zeros(self.rest[where].shape[:2])
         if where == "vertex":

@@ -45,11 +45,11 @@ class Derivatives(NamedTuple):
 
 class Form:
     """The weak form of a body. ``derivatives``: derivatives of the energy, with ``kinds`` variables per component of the
-    displacement; effects with an amount of zero over full frames are left out. ``loads``: the residual of loads on the surface, 0
-    without loads; ``stretched``: the same for effects that store energy on the surface.
+    displacement; an effect whose amount is zero from one frame to the next is left out there. ``loads``: the residual of loads on
+    the surface, 0 without loads; ``stretched``: the same for effects that store energy on the surface.
 
     ``energy``: the stored energy as an integral; ``determinant``: det F; ``fibre_stretch``: as the energies use it (None without
-    fibres). The user sets the amounts of effects (``set_amounts``) and the time ``step`` (None if nothing depends on it).
+    fibres). The caller sets the amounts of effects (``set_amounts``) and the time ``step`` (None if nothing depends on it).
     ``kinetic``: the kinetic energy (0 without inertia); ``rule``: points (q, 3) and weights (q,) of the quadrature, of ``degree``;
     ``regions``: this rank's facets by name; ``rest``: the stress at rest of a body in situ.
     """
@@ -158,7 +158,7 @@ class Form:
         return {name: self._known(body, share) for name, share in shares.items()}
 
     def _places(self, points: Floats, cells: Ints) -> Floats:
-        """The places (n, 3) [mm] at rest of reference ``points`` (q, 3) in all cells."""
+        """The rest positions (n, 3) [mm] of reference ``points`` (q, 3) in all cells."""
         return geometry(self.mesh, points, slice(len(cells)))[0].reshape(-1, 3)
 
     def _known(self, body: Body, values: Floats) -> fem.Function:
@@ -174,7 +174,7 @@ class Form:
 
 @dataclass(frozen=True, eq=False)
 class TimeStep:
-    """A load step's inverse duration ``rate`` [1/s], unknowns ``before``, and with inertia ``predicted`` ones and ``velocity``."""
+    """A load step's inverse duration ``rate`` [1/s] and the unknowns ``before``; with inertia those ``predicted``, ``velocity``."""
 
     rate: fem.Constant
     before: fem.Function
@@ -223,7 +223,7 @@ def _rows(F: Any) -> list[list[Any]]:
 
 
 def _silent(effect: Effect, frames: tuple[float, ...]) -> list[tuple[float, float]]:
-    """The spans from one of the ``frames`` to the next over which an energy is zero."""
+    """The spans, from one of the ``frames`` to the next, in which the energy of an ``effect`` is zero."""
     if not isinstance(effect, Energy) or not isinstance(effect, Ramped):
         return []
     knots = [knot.frame for knot in effect.ramp]

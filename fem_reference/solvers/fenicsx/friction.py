@@ -10,14 +10,14 @@ from fem_reference.geometry.rigid_bodies import Sampled
 from fem_reference.problems.contact import ContactLaw
 from fem_reference.problems.friction import returned, since_entry
 
-# The places (m, 3) [mm] of points (m,) in the frame of the bone, and their gaps (m,) [mm], in the last settled state.
+# The positions (m, 3) [mm] of points (m,) in the frame of the bone, and their gaps (m,) [mm], in the last settled state.
 Before = Callable[[Ints], tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True, eq=False)
 class Grip:
     """Friction of n points ``which`` (n,): the ``traction`` (n, 3) [MPa] and its ``slope`` (n, 3, 3), the places ``stuck`` (n, 3)
-    that hold the points, all in the frame of the bone, and the work ``lost`` (n,) [N/mm] per unit rest area since it settled.
+    that hold the points, all in the frame of the bone, and the work ``lost`` (n,) [N/mm] per rest area since the settled state.
     """
 
     which: Ints
@@ -74,7 +74,7 @@ class Friction:
         return slip, change
 
     def settle(self, grip: Grip) -> None:
-        """Hold only the points of ``grip`` from now on, at the places to which it has dragged them."""
+        """Hold only the points of ``grip``, at its places ``stuck``, until the next call."""
         self.stuck[:] = np.nan
         self.stuck[grip.which] = grip.stuck
 

@@ -15,12 +15,12 @@ from fem_reference.solvers.fenicsx.system import System
 
 _MOST = 40  # linear problems
 _TOLERANCE = 1e-12  # the relative tolerance of a linear problem
-_SHARE = 1e-2  # the remaining residual, as a share of the tolerance of Newton's method
+_SHARE = 1e-2  # the remaining residual, as a fraction of the tolerance of Newton's method
 
 
 def balance(form: Form, system: System, linear: LinearSolver, residual: float) -> None:
-    """Find the stress at rest of a ``form``, if it has one, up to a small share of the tolerated ``residual`` of Newton's method.
-    ArithmeticError if there is none.
+    """Find the stress at rest of a ``form`` in situ, up to a small fraction of the tolerance ``residual`` of Newton's method.
+    ArithmeticError if no stress at rest is found.
     """
     if form.rest is None:
         return
@@ -29,7 +29,7 @@ def balance(form: Form, system: System, linear: LinearSolver, residual: float) -
     for _ in range(_MOST):
         if system.residual() <= _SHARE * residual:
             if contact is not None:
-                contact.look()  # points that are pressed at rest have a longer reach
+                contact.look()  # the bones' reach depends on the overlaps, which have changed
             return
         forces = system.b.copy()
         with form.isotropic():

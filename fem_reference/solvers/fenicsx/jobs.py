@@ -53,8 +53,8 @@ def _is_of(whole: Kept, number: int) -> bool:
 class Job:
     """A ``body`` and how to solve it. ``samples``: by name, the cell (n,) of each point and the rest points (n, 3) whose positions
     are requested. Only a muscle has samples; forces at edges shared by attachments are then divided between the attachments.
-    ``kept``: the states that are kept, if any. InputError if stable states are to be followed with friction, or with contact along
-    own normals, as their stability is not known.
+    ``kept``: stored states, if any. InputError if stable states are to be followed with friction, or with contact along own
+    normals, as negative modes are not counted then.
     """
 
     body: Body
@@ -65,4 +65,4 @@ class Job:
     def __post_init__(self) -> None:
         if not self.body.has_energy and self.settings.follow == "stable":
             got = f'"stable" with {"friction" if self.body.rubs else "contact along own normals"}'
-            raise InputError("follow", got, '"equilibrium", as its unstable states are not counted')
+            raise InputError("follow", got, '"equilibrium", as negative modes are not counted then')

@@ -1,4 +1,4 @@
-"""Linear systems solved with a sparse factorisation (MUMPS), used as long as it is a good preconditioner."""
+"""Linear systems solved with a sparse factorisation (MUMPS), reused as long as it is a good preconditioner."""
 
 from itertools import count
 
@@ -14,7 +14,7 @@ _FLOPS, _ENTRIES = 3, 29  # indices of RINFOG, the operations of a factorisation
 # Above this number of unknowns the factors are compressed by blocks (BLR: ICNTL(35)), up to an error of 1e-5 (CNTL(7)). Compression
 # halves the time of a factorisation at 170 000 unknowns and gains nothing at 16 000.
 _COMPRESSED_FROM, _COMPRESSION, _DROPPED = 80_000, 35, 7
-# A back-substitution per entry of the factors, in operations of a factorisation, measured at 16 000 and 200 000 unknowns.
+# The cost of a back-substitution per entry of the factors, in operations of a factorisation (at 16 000 and 200 000 unknowns).
 _OPERATIONS = 22.0
 _LEAST, _MOST = 12, 80  # bounds of the number of Krylov iterations for which an old factorisation is kept
 _INVERSE_ITERATIONS, _RESOLVED = 4, 0.1  # for the test of single precision
@@ -46,7 +46,7 @@ def iterate(krylov: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, mos
 
 class Factorised:
     """Solves with the present ``matrix``; if ``lagged``, by FGMRES preconditioned with an older factorisation, which is replaced
-    once its iterations, for one system or all since, took longer than a new factorisation. Factors are LDL^T if symmetric, else LU.
+    once FGMRES, for one system or for all since, took longer than a new factorisation. Factors are LDL^T if symmetric, else LU.
     """
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, lagged: bool, precision: str, spent: Spent) -> None:
@@ -96,7 +96,7 @@ class Factorised:
         with self.spent.on("factorisation"):
             self.preconditioner.setReusePreconditioner(False)
             self.krylov.setOperators(self.matrix, self.matrix)
-            # Only this ``setUp`` reads the option; PETSc would warn of one that is still set, but unread, when it ends.
+            # Only this ``setUp`` reads the option; at its end PETSc would warn of an option that is set but not read.
             options.setValue("pc_precision", self.precision)
             self.preconditioner.setUp()
             options.delValue("pc_precision")
@@ -116,7 +116,7 @@ class Factorised:
         """Solve for ``x``, up to ``tolerance`` times the norm of ``b``, or exactly; ``LinearSolveError`` if this fails."""
         if not self.lagged:
             tolerance = _EXACT
-        # A factorisation whose iterations took as long as a new one is replaced: that takes at most twice the least possible time.
+        # A factorisation is replaced once its iterations took as long as a new one: so the time is at most twice the minimum.
         serves = self.fresh or (self.lagged and self.since < self.limit)
         if self.factorised is not None and serves and self._iterate(b, x, tolerance, self.limit):
             return

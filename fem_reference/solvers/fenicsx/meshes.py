@@ -18,15 +18,15 @@ from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 # For each element, the degree up to which polynomials on a straight cell are integrated exactly.
 DEGREE = {"P1": 2, "P1/P1": 2, "P2": 5, "P2/P0": 5, "P2/P1": 5, "Q1": 3, "Q2": 5, "Q1/P0": 3, "Q2/Q1": 5}
 
-# A rule of degree 5 that includes the vertices: a vertex's share of the volume, then the shares and barycentric coordinates of
-# orbits.
+# A rule of degree 5 that includes the vertices: the weight of a vertex, then weights and barycentric coordinates of the other
+# orbits. Weights are fractions of the volume.
 _VERTEX_SHARE = 0.002
 _ON_MEDIANS = ((0.11990832171874463, 0.3141518976943535), (0.09393542311163477, 0.10944719170192463))
 _ON_BIMEDIANS = (0.02277083677974708, 0.010913290341505138)
 
 
 def rule(element: str, degree: int | None) -> tuple[Floats, Floats]:
-    """Points (q, 3) and weights (q,) on the reference cell of an element, of ``degree`` or, where it is None, of ``DEGREE``.
+    """Points (q, 3) and weights (q,) on the reference cell of an element: a rule of ``degree``, by default of ``DEGREE``.
 
     On quadratic tetrahedra the default rule includes the vertices. There det F of a quadratic displacement is smallest in an
     inverting cell, and an energy that grows without bound as det F falls to zero keeps det F positive where the energy is
@@ -40,10 +40,10 @@ def rule(element: str, degree: int | None) -> tuple[Floats, Floats]:
 
 
 def with_vertices() -> tuple[Floats, Floats]:
-    """18 points on the unit tetrahedron, exact to degree 5: vertices, twice 4 on the medians and 6 on the bimedians.
+    """A rule of 18 points on the unit tetrahedron, exact to degree 5: vertices, twice 4 on the medians and 6 on the bimedians.
 
-    The shares and coordinates solve the seven moment equations of degrees 0, 2, 3, 4, 4, 5 and 5 for the given share of a vertex;
-    for a share of 0 they agree with Walkington 2000, Quadrature on simplices of arbitrary dimension.
+    Weights and coordinates solve the seven moment equations of degrees 0, 2, 3, 4, 4, 5 and 5 for the given weight of a vertex;
+    for a weight of 0 they agree with Walkington 2000, Quadrature on simplices of arbitrary dimension.
     """
     points, weights = [np.eye(4, 3, -1)], [np.full(4, _VERTEX_SHARE)]
     for share, a in _ON_MEDIANS:
@@ -62,7 +62,7 @@ def lagrange(kind: str, degree: int) -> Any:
 
 
 def geometry(msh: mesh.Mesh, points: Floats, cells: Ints | slice) -> tuple[Floats, Floats]:
-    """The rest positions (m, q, 3) [mm] of reference ``points`` (q, 3) in ``cells`` (m,), and their slopes (m, q, 3, 3) there."""
+    """The rest positions (m, q, 3) [mm] of reference ``points`` (q, 3) in ``cells`` (m,), and their derivatives (m, q, 3, 3)."""
     values = lagrange(msh.topology.cell_name(), msh.geometry.cmap.degree).tabulate(1, points)[..., 0]
     nodes = msh.geometry.x[msh.geometry.dofmap[cells]]
     return np.einsum("qk,mki->mqi", values[0], nodes), np.einsum("jqk,mki->mqij", values[1:], nodes)
@@ -115,7 +115,7 @@ def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
 
 
 def local_facets(msh: mesh.Mesh, regions: Iterable[Ints]) -> list[Ints]:
-    """This rank's facets of each region, whose facets (f, k) are given by their corners, points of the original mesh."""
+    """This rank's facets in each of ``regions``, which are arrays (f, k) of the corners of facets in the original mesh."""
     topology, facet = msh.topology, msh.topology.dim - 1
     for start, end in ((facet, facet + 1), (facet + 1, facet), (facet, 0), (0, facet + 1), (facet + 1, 0)):
         topology.create_connectivity(start, end)
@@ -129,14 +129,14 @@ def local_facets(msh: mesh.Mesh, regions: Iterable[Ints]) -> list[Ints]:
 
 
 def facet_measure(msh: mesh.Mesh, regions: Iterable[Ints], degree: int) -> ufl.Measure:
-    """The measure of this rank's facets with quadrature of a ``degree``; its subdomains are numbered as the regions are."""
+    """The measure of this rank's facets with quadrature of a ``degree``; its subdomains have the order of the ``regions``."""
     kind = fem.IntegralType.exterior_facet
     parts = [(i, fem.compute_integration_domains(kind, msh.topology, facets)) for i, facets in enumerate(regions)]
     return ufl.Measure("ds", domain=msh, subdomain_data=parts, metadata={"quadrature_degree": degree})
 
 
 def unknowns(msh: mesh.Mesh, element: str) -> fem.Function:
-    """The unknowns of a body: displacement, and pressure where the element has one."""
+    """The unknowns of a body: displacement, and pressure if the element has it."""
     kind, degree, pressure = ELEMENTS[element]
     parts = [basix.ufl.element("Lagrange", kind, degree, shape=(3,))]
     if pressure is not None:

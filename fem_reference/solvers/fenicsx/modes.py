@@ -17,15 +17,15 @@ from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 _ITERATIONS = 40  # the number of inverse iterations
 _LARGER = (1, 2, 4, 8)  # factors of the perturbation, tried in turn if the state returns or no solution is found
 _SHIFT, _GROWTH = 1e-6, 4.0
-_DIFFERENCE = 1e-3  # the interval for differences along the path, as a share of the smallest load step
-# The greatest reported distance to a limit point, in smallest load steps. The step that failed was up to two of them long, and the
+_DIFFERENCE = 1e-3  # the interval for differences along the path, as a fraction of the smallest load step
+# A limit point is reported up to this distance, in smallest load steps: the step that failed was up to two of them long, and the
 # distance is known only up to a factor.
 _NEAR = 4
-_SOFT = 0.3  # Near a limit point, the stiffness of the softest mode is at most this share of its value at rest.
+_SOFT = 0.3  # Near a limit point, the stiffness of the softest mode is at most this fraction of its value at rest.
 
 
 def softest(body: AssembledBody, linear: LinearSolver) -> PETSc.Vec:
-    """The mode of the least eigenvalue, by magnitude, of the matrix of ``linear``; its displacements have length 1.
+    """The mode whose eigenvalue has the smallest magnitude, of the matrix of ``linear``; its displacements have norm 1.
 
     By inverse iteration from a random start; only displacements have a mass. ``LinearSolveError`` if no displacement is free.
     """
@@ -60,8 +60,8 @@ def _displacements(body: AssembledBody, mode: PETSc.Vec) -> Floats:
 
 
 def leave(body: AssembledBody, frame: float, share: float) -> float | None:
-    """Perturb the present state, at ``frame``, by a ``share`` of the body's size along its lowest mode, and solve again until there
-    are fewer negative modes. Returns the perturbation [mm], None if the state is stable or no other state is found. Collective.
+    """Perturb the present state, at ``frame``, along its lowest mode by the body's size times ``share``, and solve again until
+    there are fewer negative modes. Returns the perturbation [mm]; None if the state is stable or no other is found. Collective.
     """
     if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
         return None
@@ -125,9 +125,9 @@ class LimitPoint:
 
 def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
     """The limit point that follows the last good state within a few load steps of the smallest size ``step``; None if there is
-    none or it cannot be known. Collective.
+    none or it cannot be found. Collective.
 
-    Before a limit point the least eigenvalue of the tangent falls as the square root of the remaining path. So its square is
+    Before a limit point the lowest eigenvalue of the tangent falls as the square root of the remaining path. So its square is
     linear, and the remaining path is half of the eigenvalue divided by its slope along the path, as in a Newton step.
     """
     if body.stability is None or body.clock.matters:

@@ -19,7 +19,7 @@ from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError, f
 from fem_reference.solvers.fenicsx.system import System
 
 _SMOOTHING = 2  # the degree of the Chebyshev polynomial
-_MOST = 200  # the greatest number of iterations
+_MOST = 200  # the maximum number of iterations
 _STALE = 15  # iterations up to which a preconditioner is never stale
 
 

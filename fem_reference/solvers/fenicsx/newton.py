@@ -12,21 +12,21 @@ from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.system import System
 
-# A step is halved until det F keeps this share of its value everywhere, but at most down to this share of the full step.
+# A step is halved until det F keeps this fraction of its value everywhere, but not below this fraction of the full step.
 _KEPT, _SHORTEST = 0.1, 1e-2
 # Eisenstat and Walker 1996 (doi 10.1137/0917003), choice 2: the tolerance of the first linear system, then the factor of later
 # tolerances and their bounds.
 _FIRST, _FACTOR, _LOOSEST, _TIGHTEST = 1e-3, 0.5, 1e-3, 1e-9
 # Newton's method gives up if the residual has not fallen to ``_PROGRESS`` times its earlier best within ``_PATIENCE`` iterations.
 _PATIENCE, _PROGRESS = 6, 0.5
-# A linear solution that would end below the target of Newton's method continues to this share of the target, as the residual of the
-# last linear system is the residual of the entire iteration.
+# A linear solution that would end below the target of Newton's method continues to this fraction of the target, as the residual of
+# the last linear system is the residual of the entire iteration.
 _PAST = 1e-2
 
 
 class Newton:
-    """Newton's method on a ``system``, in full steps by ``linear``. A line search would weigh forces [N] against volumes [mm3], and
-    would stall if bodies bend or are soft.
+    """Newton's method on a ``system``, with full steps from ``linear``. There is no line search: it would weigh forces [N] against
+    volumes [mm3], and would stall if bodies bend or are soft.
     """
 
     def __init__(
@@ -84,11 +84,11 @@ class Newton:
         """The reason to stop iterating after ``residuals``, None if there is none."""
         iterations = len(residuals) - 1
         if not np.isfinite(residuals[-1]):
-            return f"reached a state where a law, or a prescribed path, has no value in {iterations} iterations"
+            return f"reached in {iterations} iterations a state where a law, or a prescribed path, has no value"
         if iterations == self.most:
             return f"did not converge in {iterations} iterations"
         if (since := stalled(residuals)) > _PATIENCE:
-            return f"made no progress in {since} iterations, of {iterations}"
+            return f"made no progress in the last {since} of {iterations} iterations"
         return None
 
     def _failed(self, residuals: list[float], why: str) -> Attempt:
@@ -98,8 +98,8 @@ class Newton:
 
     def _begin(self, frame: float) -> float:
         """Assemble the first iteration's system. Bones at their next poses would overlap points that have not moved yet, and the
-        iteration would start from meaningless forces. So this system has the contact pressures of the last state, linear in the
-        motion of the bones.
+        iteration would start from meaningless forces. So this system has the contact pressures of the last state, changed to first
+        order by the motion of the bones.
         """
         moves = -self.system.missing()
         if self.system.contact is None:
@@ -123,7 +123,7 @@ class Newton:
         if norm == 0 or last == 0:
             return _FIRST
         wanted = _FIRST if np.isnan(last) else float(np.clip(_FACTOR * (norm / last) ** 2, _TIGHTEST, _LOOSEST))
-        # Linear systems weigh the residual of pressures by their unit.
+        # In linear systems the residual of a pressure is multiplied by the unit of pressure.
         enough = self.residual * min(1.0, self.system.tangent.unit)
         if wanted * norm < enough:
             wanted = min(wanted, _PAST * enough / norm)
@@ -146,7 +146,7 @@ class Newton:
 
 
 def stalled(residuals: list[float]) -> int:
-    """The number of the last ``residuals`` since one fell to half of the best before it.
+    """The number of ``residuals`` after the last one that fell below half of the best before it.
 
     >>> stalled([1.0]), stalled([1.0, 0.4, 0.1]), stalled([1.0, 0.4, 0.3, 2.0])
     (0, 0, 2)

@@ -12,12 +12,12 @@ from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme
 from fem_reference.solvers.fenicsx.system import System
 
-# On the straight line from one state to the next, det F is a cubic along the line and has to stay above this share of the lesser of
+# On the straight line from one state to the next, det F is a cubic polynomial and has to stay above this fraction of the smaller of
 # its end values. A turn by 143 degrees within a step reduces det F to a tenth; half a turn, or a mirrored state on the line, to 0
 # or below.
 KEPT = 0.1
 _SHARES = (0.0, 1 / 3, 2 / 3, 1.0)
-_CUBIC = np.linalg.inv(np.vander(_SHARES, 4))  # converts values at these shares to the coefficients of a cubic
+_CUBIC = np.linalg.inv(np.vander(_SHARES, 4))  # converts values at these fractions to the coefficients of a cubic
 
 # Loads and boundary conditions are the same up to the rounding of a returning motion (in mm, and in entries of a pose).
 _SAME = 1e-9
@@ -34,8 +34,8 @@ class Path:
         self.unknowns, self.forces = np.array(system.unknowns.x.array), self.system.reactions(inside=True)
 
     def jumped(self, before: Floats) -> Extreme | None:
-        """The least det F, relative to its end values, on the straight line from the unknowns ``before`` to the present ones; None
-        if more than ``KEPT`` is left. In a body that deforms steadily in small steps det F never falls that low.
+        """The smallest det F, divided by the smaller of its end values, on the straight line from the unknowns ``before`` to the
+        present ones; None if it exceeds ``KEPT``, as it does in a body that deforms steadily in small steps.
         """
         unknowns = self.system.unknowns.x
         after, values = np.array(unknowns.array), []
@@ -53,18 +53,18 @@ class Path:
         if jump is None:
             return None
         place = f"in cell {jump.cell} at {place_of(jump.at)}"
-        way = "on the straight line from the last one det F falls to"
-        return Trouble("diverged", f"to a state on another path: {way} {jump.value:.2g} of itself, {place}")
+        way = "on the straight line from the last state det F falls to"
+        return Trouble("diverged", f"to a state on another path: {way} {jump.value:.2g} of its end value, {place}")
 
     def settle(self, energy: float, halfway: Callable[[], bool] | None = None, *, connected: bool = True) -> None:
         """Take the present state as the next one, with the stored ``energy`` [N mm]; if it is ``connected`` with the previous
         state, compare the growth of the energy with the work of the internal forces, by the trapezoidal rule.
 
         The rule is exact if forces are linear in the displacement, and its error is of second order in the step: for a law that
-        stiffens, or a rotation, its error is tenths of the energy in the first step from rest. So beyond ``ENERGY_GAP`` the
-        function ``halfway`` solves for a state halfway, puts it into the unknowns, which are restored afterwards, and returns True
-        if it was found. Then Simpson's rule is used, whose error is of fourth order. In a jump the energy falls without work by
-        either rule. ``gap`` is the greatest difference since ``gap`` was last read, divided by the greatest energy so far.
+        stiffens, or a rotation, it is tenths of the energy in the first step from rest. So if the difference exceeds
+        ``ENERGY_GAP``, the function ``halfway`` solves for a state halfway, puts it into the unknowns, which are restored
+        afterwards, and returns True if it succeeds. Then Simpson's rule is used, whose error is of fourth order. In a jump, either
+        rule shows a fall of energy without work. ``gap``: the largest difference since it was last read, over the maximum energy.
         """
         states = [
             (self.unknowns, self.forces),
@@ -82,7 +82,7 @@ class Path:
 
     def _gap(self, energy: float, states: list[tuple[Floats, Floats]]) -> float:
         """The growth of the energy that no work explains, up to the last of ``states`` (unknowns and forces), divided by the
-        greatest energy so far; there are two states, or three at equal intervals of time.
+        maximum energy so far; there are two states, or three at equal intervals of time.
         """
         own = self.system.owned
         work = sum(float(np.dot(forces[:own], moves[:own])) for forces, moves in _products(states))
@@ -96,8 +96,8 @@ class Path:
 
 
 def _products(states: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
-    """Forces, and the displacements along which they work: straight lines between two ``states``, or parabolas over time through
-    three. The work along these follows from Simpson's rule, which is exact for them.
+    """Weighted forces and the displacements over which they do work: for two ``states`` by the trapezoidal rule on a straight line,
+    for three by Simpson's rule on a parabola over time.
     """
     if len(states) == 2:
         (start, first), (end, last) = states
@@ -108,7 +108,7 @@ def _products(states: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]
 
 
 def least(values: Floats) -> Floats:
-    """The least value (p,) from 0 to 1 of the cubics with ``values`` (4, p) at 0, 1/3, 2/3 and 1.
+    """The minimum (p,) between 0 and 1 of the cubics with ``values`` (4, p) at 0, 1/3, 2/3 and 1.
 
     >>> abs(least(np.array([[1.0], [1 / 9], [1 / 9], [1.0]]))).round(12).tolist()
     [0.0]
@@ -117,7 +117,7 @@ def least(values: Floats) -> Floats:
     found = np.minimum(values[0], values[-1])
     with np.errstate(invalid="ignore", divide="ignore"):
         root = np.sqrt(b**2 - 3 * a * c)
-        # The turning points; each in a second form too, which holds where the cubic term almost vanishes.
+        # The turning points, each in two forms, of which one is accurate if the cubic term almost vanishes.
         turns = [-c / (b + root), -c / (b - root), (-b + root) / (3 * a), (-b - root) / (3 * a)]
     for turn in turns:
         inside = np.isfinite(turn) & (turn > 0) & (turn < 1)

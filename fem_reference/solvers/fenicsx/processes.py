@@ -29,7 +29,7 @@ _SETTINGS = {
 }
 # The number of ranks that is accepted on any machine; more ranks need a machine with as many cores.
 _MOST_RANKS = 8
-PATIENCE = 5.0  # [s] between the request to end a process and its being killed
+PATIENCE = 5.0  # [s] from the request to end a process to the signal that kills it
 # The allowed clock time, as a multiple of the limit of processor time plus the start-up time; a run beyond it allows no conclusion.
 CLOCK, _START = 20, 3.0  # [s]
 _GLANCE = 0.02  # [s] between checks of the processor time
@@ -110,14 +110,14 @@ class Process:
         return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({self._reason()}); {kept}")
 
     def _reason(self) -> str:
-        """The most informative line of its error output: the last that names an error, else the last."""
+        """The most informative line of the error output: the last that names an error, else the last."""
         named = [line for line in self.errors if re.match(r"\w*(\.\w+)*(Error|Exception)\b", line)]
         return (named or self.errors or ["without a message"])[-1].strip()
 
     @contextmanager
     def _limited(self, time_limit: float | None) -> Iterator[None]:
-        """End it if one of its processes takes more than ``time_limit`` [s] of processor time, independent of other load on the
-        machine. It is also ended after ``CLOCK`` times this by the clock, which allows no conclusion.
+        """A context in which the process is ended if it, or a process that it starts, takes more than ``time_limit`` [s] of
+        processor time, or about ``CLOCK`` times as much clock time, which allows no conclusion.
         """
         if time_limit is None:
             yield

@@ -20,7 +20,7 @@ LARGE = 350_000
 # factors of 16 000 unknowns in double precision; and the power with which factors grow. Measured on gluteus_maximus from 16 000 to
 # 560 000 unknowns. MUMPS allocates more than it uses.
 _EMPTY, _EACH, _EACH_MULTIGRID, _FACTORS, _POWER = 250.0, 6.5e-3, 1e-2, 60.0, 1.38
-# The most bytes of states, over all frames, that a run keeps by default.
+# The maximum size [bytes] of the states of all frames that a run stores by default.
 MOST_STATES = 2**26
 # From this number of unknowns on, a second rank saves time, if a core is free for it.
 _WORTH_RANKS = 20_000
@@ -28,14 +28,14 @@ _GLANCE = 0.2  # [s] over which the load of the cores is measured
 
 
 def unknowns(cells: Cells, element: str) -> int:
-    """The approximate number of unknowns of a body of ``cells`` with an ``element``; a quadratic one has a node on every edge."""
+    """The approximate number of unknowns on ``cells`` with an ``element``; a quadratic element has a node on every edge."""
     kind, degree, pressure = ELEMENTS[element]
     corners = cells.cells[:, : 4 if kind == "tetrahedron" else 8]
     count = len(np.unique(corners))
     pressures = {None: 0, 0: len(corners), 1: count}[pressure]
     if degree == 2:
         if kind == "hexahedron":
-            count *= 8  # there are this many edges, faces and cells per vertex in a large grid
+            count *= 8  # a large grid has 3 edges, 3 faces and 1 cell per vertex
         else:
             pairs = np.concatenate([np.sort(corners[:, pair], axis=1) for pair in combinations(range(4), 2)])
             count += len(np.unique(pairs[:, 0].astype(np.int64) * (corners.max() + 1) + pairs[:, 1]))
@@ -68,7 +68,7 @@ def available() -> float:
 
 
 def planned[S: BodySettings](settings: S, cells: Cells, free: float) -> S:
-    """Settings with linear solver and precision: as requested, or as size and ``free`` megabytes allow; InputError if none fits."""
+    """Settings with linear solver and precision, as requested or as size and ``free`` [MB] allow; InputError if none fits."""
     count = unknowns(cells, settings.element)
     for kind in [settings.linear_solver] if settings.linear_solver else _fitting(settings.element, count):
         precision = settings.precision or ("double" if kind == "direct" else "single")

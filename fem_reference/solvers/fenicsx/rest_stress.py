@@ -13,7 +13,7 @@ from fem_reference.effects.neo_hooke import NeoHooke
 
 
 class RestStress:
-    """Stress by the ``response`` (like ``unknowns``) of an isotropic body to the effects at rest; see ``effects.in_situ``."""
+    """Stress from the ``response`` (like ``unknowns``) of an isotropic body to the effects at rest; see ``effects.in_situ``."""
 
     def __init__(self, unknowns: fem.Function, effects: tuple[Effect, ...]) -> None:
         self.response = fem.Function(unknowns.function_space)

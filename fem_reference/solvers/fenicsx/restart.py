@@ -1,4 +1,4 @@
-"""The states of a run on disk, bit by bit: a process that reads them continues exactly as the writing process would have.
+"""The states of a run on disk, exact to the bit: a process that reads them continues exactly as the writing process would have.
 
 <run>/restart/frame_0010.npz   the unknowns and the arrays of the clock, (n,) in the order of the body's cells; ``facts``, in JSON
 """
@@ -27,7 +27,7 @@ class Restart:
         self.note = ""  # for a run that continues with other effects
 
     def _numbers(self) -> Ints:
-        """The number of each unknown (m, u) of all cells, by order of first appearance: the same on any number of ranks."""
+        """The number of each unknown (m, u) of all cells, in order of first appearance: the same for any number of ranks."""
         dofmap = self.body.unknowns.function_space.dofmap
         blocks, components = np.divmod(self.dofs[: len(self.body.cells)], dofmap.index_map_bs)
         everywhere = dofmap.index_map.local_to_global(blocks.ravel().astype(np.int32)).reshape(blocks.shape)

@@ -1,6 +1,6 @@
 """Friction between parts of a surface: points of one side stick to places on the facets of the other, or slide along these.
 
-Slip is counted in the coordinates of a facet, which move with it: a rigid motion changes none, so forces and moments balance.
+Slip is measured in coordinates of a facet, which move with it: a rigid motion causes no slip, so forces and moments balance.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from fem_reference.problems.friction import returned, since_entry
 from fem_reference.solvers.fenicsx.facets import FacetPlaces
 from fem_reference.solvers.fenicsx.touching_passes import Met, Pass
 
-# Second and third derivatives in the order in which basix tabulates them.
+# Indices of second and third derivatives in the tables of basix.
 _SECOND = np.array([[3, 4], [4, 5]])
 _THIRD = np.array([[[6, 7], [7, 8]], [[7, 8], [8, 9]]])
 
@@ -21,8 +21,8 @@ _THIRD = np.array([[[6, 7], [7, 8]], [[7, 8], [8, 9]]])
 class Rubbed:
     """Friction of n points. Twelve quantities depend on the unknowns ``dofs`` (n, a) with derivatives ``rows`` (n, 12, a): x - y
     (3), both slopes of the facet (3 each), and its second slopes along the normal (3). ``pull`` (n, 12) [N]: the forces along
-    these; ``second`` (n, 12, 12): their derivative, signed like an energy's second one. ``held`` (n, 2): the places that hold the
-    points, in the coordinates of their facets now; ``lost`` (n,) [N mm]: the work; ``far`` (n,): the distance slid beyond a facet.
+    these; ``second`` (n, 12, 12): their derivative, with the sign of an energy's Hessian. ``held`` (n, 2): the places that hold the
+    points, in coordinates of their present facets; ``lost`` (n,) [N mm]: the work; ``far`` (n,): the distance slid beyond a facet.
     """
 
     dofs: Ints
@@ -47,10 +47,11 @@ class Sliding:
 
 
 def slip(there: FacetPlaces, gap: Floats, second: Floats, third: Floats) -> Sliding:
-    """The derivatives of the coordinates of the place nearest to a point at a ``gap`` (n,) [mm], from ``y' (x - y) = 0``.
+    """The derivatives of the coordinates of the place nearest to a point at a ``gap`` g (n,) [mm], from ``y' (x - y) = 0``.
 
-    With the slopes y' of the facet, ``R = x - y = g n`` and ``m = a - g b`` the first is ``m^-1 (y' (dx - dy) + R dy')``, and the
-    second is m^-1 times that of the condition along the first. ``second`` and ``third``: of the position [mm].
+    With slopes y', metric a and second slopes b along the normal of the facet, ``R = x - y = g n`` and ``m = a - g b``: the first
+    is ``m^-1 (y' (dx - dy) + R dy')``, and the second is m^-1 times the second derivative of the condition along the first.
+    ``second`` and ``third``: derivatives of the position [mm].
     """
     count, y, R = len(gap), there.tangents, gap[:, None] * there.normal
     inverse = np.linalg.inv(there.metric - gap[:, None, None] * there.bend)
@@ -95,7 +96,7 @@ class Rubbing:
         self.facets, self.at, self.settled = np.full(len(one.areas), -1), np.zeros((len(one.areas), 2)), np.zeros(count)
 
     def settle(self, met: Met, held: Floats, unknowns: Floats) -> None:
-        """Hold the points that ``met`` facets from now on at the places ``held`` (k, 2) on these, and no other points."""
+        """Hold only the points that ``met`` facets, at the places ``held`` (k, 2) on these, until the next call."""
         self.acts = self.law.relaxed is None or self.one.share == 0
         self.facets[:] = -1
         self.facets[met.points], self.at[met.points], self.settled = met.facets, held, np.array(unknowns)
@@ -134,7 +135,7 @@ class Rubbing:
 
     def _slipped(self, met: Met, unknowns: Floats, tables: Floats) -> tuple[Sliding, Floats, Floats, Floats]:
         """The derivatives of the places on the facets; their whole displacement (n, 2) since the settled state, the part (n, 2) of
-        it that counts as elastic slip, and its derivative (n, 2, 12). ``tables``: those of the facets' functions.
+        it that counts as elastic slip, and its derivative (n, 2, 12). ``tables``: of the facets' basis functions.
         """
         every = np.einsum("dnk,nki->dni", tables, self.other.nodes(unknowns)[met.facets])
         place = slip(
@@ -146,7 +147,7 @@ class Rubbing:
         return place, whole, share[:, None] * whole, change
 
     def _starts(self, met: Met) -> tuple[Floats, Floats, Floats]:
-        """The coordinates (n, 2) on the facets from which the points slip, the share (n,) of the path from there that counts as
+        """The coordinates (n, 2) on the facets from which the points slip, the fraction (n,) of the path from there that counts as
         slip, and its derivative (n,) in the gap. A point new in contact slips from where its path comes within the smoothing.
         """
         at, share, by_gap = self.at[met.points], np.ones(len(met.gap)), np.zeros(len(met.gap))

@@ -21,7 +21,7 @@ from fem_reference.solvers.fenicsx.settings import BodySettings, FieldSettings
 
 
 class Session:
-    """Solves problems on ``ranks`` in a subprocess, restarted if it died; jobs and frames are passed as files in a ``folder``."""
+    """Solves problems in a subprocess with ``ranks``, restarted if it died; jobs and frames are passed as files in a ``folder``."""
 
     def __init__(self, folder: Path, ranks: int) -> None:
         self.folder, self.ranks = folder.resolve(), ranks  # the process may have another working directory
@@ -35,7 +35,7 @@ class Session:
         return replace(collected(frames, outcome), solver="fenicsx", body=body, settings=settings)
 
     def follow(self, body: Body, settings: BodySettings, sink: Sink) -> Outcome:
-        """Pass the frames of ``body`` to ``sink``; InputError if the element does not suit it."""
+        """Solve for ``body`` and pass its frames to ``sink``; InputError if element, ranks or linear solver do not suit it."""
         check(body, settings.element, settings.quadrature_degree)
         if body.touching and self.ranks > 1:
             raise InputError("ranks", self.ranks, "1, as only then parts of the surface may touch")
@@ -85,8 +85,8 @@ _shared: ContextVar[Session | None] = ContextVar("shared", default=None)
 
 @contextmanager
 def shared() -> Iterator[None]:
-    """A context in which all solutions on one rank run in one process, which reuses loaded and compiled code; a process that is
-    already shared remains in use. Without FEniCSx nothing is shared.
+    """A context in which all problems on one rank are solved in one process, which reuses loaded and compiled code; a process that
+    is already shared remains in use. Without FEniCSx nothing is shared.
     """
     with session() if installed() and _shared.get() is None else nullcontext(_shared.get()) as own:
         before = _shared.set(own)
@@ -106,19 +106,19 @@ def opened(ranks: int = 1) -> AbstractContextManager[Session]:
 
 
 def solve_on(body: Body, settings: BodySettings, sink: Sink) -> Outcome:
-    """Pass the frames of ``body`` to ``sink``, by the shared session or by a new one."""
+    """Solve for ``body``, in the shared session or in a new one, and pass its frames to ``sink``."""
     with opened() as solver:
         return solver.follow(body, settings, sink)
 
 
 def solve_body(body: Body, settings: BodySettings) -> Run:
-    """The run of ``body``, in memory, by the shared session or by a new one."""
+    """The run of ``body`` in memory, solved in the shared session or in a new one."""
     with opened() as solver:
         return solver.solve(body, settings)
 
 
 def solve_scalar(problem: FieldProblem, settings: FieldSettings, sink: Sink) -> Outcome:
-    """Solve for a scalar field and pass it to ``sink``, by the shared session or by a new one; NaN if the process died."""
+    """Solve for a scalar field, in the shared session or in a new one, and pass it to ``sink``; NaN if the process died."""
     frames: list[Frame] = []
     with opened() as solver:
         outcome = solver.run(problem, settings.time_limit, frames.append)

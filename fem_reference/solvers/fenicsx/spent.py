@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 
 class Spent:
-    """``seconds`` by phase of this process, and ``counts`` by name. A phase within another counts as the inner one only."""
+    """``seconds`` of this process by phase, and ``counts`` by name. Time in a phase within another counts for the inner one."""
 
     def __init__(self) -> None:
         self.seconds: defaultdict[str, float] = defaultdict(float)

@@ -133,8 +133,8 @@ class System:
         return norm
 
     def balance_units(self) -> None:
-        """Choose from the present tangent a unit of pressure that gives volumes [mm3] and forces [N], and pressures and
-        displacements [mm], equal weight in linear systems.
+        """Choose a unit of pressure from the present tangent: in linear systems it gives volumes [mm3] the weight of forces [N],
+        and pressures the weight of displacements [mm].
         """
         space = self.unknowns.function_space
         if space.num_sub_spaces == 1:
@@ -151,7 +151,7 @@ class System:
             self.tangent.unit = self.scale[pressures] = float(np.sqrt(stiff / coupling))
 
     def missing(self) -> Floats:
-        """The unknowns minus their prescribed values (n,); 0 if nothing is prescribed."""
+        """The unknowns minus their prescribed values (n,); 0 for an unknown that is not prescribed."""
         found = np.zeros(self.size)
         for one in self.conditions:
             found[one.exact] = self.unknowns.x.array[one.exact] - one.prescribed[: len(one.exact)]
@@ -208,9 +208,9 @@ class SurfaceSums:
 def reactions(
     system: System, contact: ContactForces | None, *, divided: bool
 ) -> tuple[dict[str, Floats], dict[str, Floats]]:
-    """The force (3,) [N] of each constraint in a ``system`` and of each bone in ``contact``, by name, on the body, and its moment
-    (3,) [N mm] about the origin. The force at an unknown of several regions is ``divided`` between them, so that all forces
-    balance; otherwise it counts in each region.
+    """The forces (3,) [N] on the body, by name of the constraint in ``system``, the bone in ``contact`` or the touching part, and
+    their moments (3,) [N mm] about the origin. The force at an unknown of several regions is ``divided`` between these, so that all
+    forces balance; otherwise it counts in each region.
     """
     residual, now, comm = system.reactions(), system.unknowns.x.array, system.unknowns.function_space.mesh.comm
     shared = np.zeros(len(now), np.int64)

@@ -23,10 +23,10 @@ from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme, le
 from fem_reference.solvers.fenicsx.forms import Form, Rule
 from fem_reference.solvers.fenicsx.meshes import geometry
 
-# A cell with less than this share of its rest volume has collapsed, whatever the ranges of laws: about four fifths of muscle are
+# A cell with less than this fraction of its rest volume has collapsed, whatever the ranges of laws: about four fifths of muscle are
 # water, which does not leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal muscle),
-# and a fifth of the volume would barely contain the solid part. A body has collapsed if such cells are more than this share of it
-# at rest; at a rim their share decreases with the size of cells.
+# and a fifth of the volume would barely contain the solid part. A body has collapsed if collapsed cells make up more than this
+# fraction of its rest volume; those that collapse at a rim make up less, the smaller they are.
 COLLAPSED, SHARE = 0.2, 0.01
 _SCALARS = {"V/V0": "cell_volume_ratio", "fibre stretch": "cell_fibre_stretch"}
 
@@ -103,7 +103,7 @@ class Validity:
         return Trouble("collapsed", why)
 
     def examine(self, frame: float) -> tuple[dict[str, float], list[Outside]]:
-        """Extremes of the present means, at ``frame``; the number ``outside_law`` of cells outside a law's range; these laws."""
+        """The extremes of the means at ``frame`` and ``outside_law``, the number of cells outside a law's range; and these laws."""
         scalars: dict[str, float] = {}
         found: list[Outside] = []
         outside = np.zeros(len(self.cells), bool)
@@ -129,7 +129,7 @@ class Validity:
         return np.average(self.values[measure]().reshape(self.volumes.shape), axis=1, weights=self.volumes)
 
     def _extreme(self, means: Floats, sign: float = 1.0) -> Extreme:
-        """The mean with the least ``sign * means`` (n,) over all ranks."""
+        """The mean with the smallest ``sign * means`` (n,) over all ranks."""
         return least(self.mesh.comm, means, self.cells, self.centres, sign=sign)
 
 

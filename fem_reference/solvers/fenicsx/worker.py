@@ -1,4 +1,4 @@
-"""The process that solves: reads pickled jobs, marches each body through its frames, and reports every frame."""
+"""The solving process: it reads pickled jobs, marches each body through its frames, and reports every frame."""
 
 import gc
 import pickle
@@ -46,11 +46,11 @@ class Worker:
         self.solving = self.solving_processor = self.checking = 0.0
         self.reported = 0.0  # ``solving_processor`` up to the last reported frame
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}
-        self.unstable: dict[float, tuple[float, float]] = {}  # by frame: the negative modes, and those of the material
-        self.left: dict[float, float] = {}  # perturbation [mm] by frame
+        self.unstable: dict[float, tuple[float, float]] = {}  # for each frame: negative modes, those of the material
+        self.left: dict[float, float] = {}  # the perturbation [mm] in each frame that has one
         self.ranges = Ranges()
         self.exact = False  # True once linear systems are solved exactly, after a failure of Newton's method
-        self.collapse = ""  # the message of an attempt since the last good state in which the body collapsed
+        self.collapse = ""  # the message of an attempt, since the last good state, in which the body collapsed
         self.earlier: dict[str, float] = {}  # the cost of earlier processes of this run
         self.restart = Restart(self.body, job.kept) if job.kept else None
 
@@ -99,7 +99,7 @@ class Worker:
         return result
 
     def solve_exactly(self) -> bool:
-        """Solve linear systems exactly from now on, as inexact solutions move a nearly free body far. True if this is a change."""
+        """Solve linear systems exactly from now on, as inexact solutions move a nearly free body too far. True if changed."""
         other = self.body.linear.solve_exactly()
         self.exact |= other
         return other
@@ -114,7 +114,7 @@ class Worker:
         )
 
     def negative_modes(self, frame: float) -> dict[str, float]:
-        """The number of directions in which the energy falls from a reached frame, if known; its time does not count as solving."""
+        """The number of directions in which the energy falls from a reached state, if known; its time does not count as solving."""
         begin = time.perf_counter()
         modes = self.body.examine(frame)
         own = self.body.modes_of_material() if modes is not None and modes > 0 else modes
@@ -220,7 +220,7 @@ def solve(job: Job | FieldProblem, report: Sink) -> Outcome:
 
 
 def report(folder: Path, found: Frame | Outcome) -> None:
-    """Write the result ``found`` by the first rank into a file in the ``folder``, and report the file to the parent process."""
+    """Write ``found``, on the first rank, into a file in the ``folder``, and report the file to the parent process."""
     if MPI.COMM_WORLD.rank == 0:
         file = folder / f"report_{next(_numbers)}.pickle"
         file.write_bytes(pickle.dumps(found))
@@ -229,7 +229,7 @@ def report(folder: Path, found: Frame | Outcome) -> None:
 
 
 def main() -> None:
-    """Solve the jobs whose files standard input names, one after the other."""
+    """Solve jobs one after the other; standard input names the file of each."""
     end_with_starter()
     compiling.prepare()
     gc.freeze()  # collections after each job then skip imported objects, which stay

@@ -1,6 +1,6 @@
-"""The independent second opinion: Lagrange elements of scikit-fem, solved by scipy's sparse LU factorisation.
+"""An independent solver as a second opinion: Lagrange elements of scikit-fem, solved by scipy's sparse LU factorisation.
 
-``field`` solves for scalar fields and ``body`` for bodies, whose stress and stiffness follow from energies by ``jets``.
+``field`` solves for scalar fields, ``body`` for bodies, whose stress and stiffness are derivatives of energies by ``jets``.
 """
 
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver
@@ -14,5 +14,5 @@ SOLVES = (
     FieldSolver(settings=ScikitFieldSettings, solve=field.solve, example={}),
     BodySolver(settings=ScikitBodySettings, solve=body.solve, example={}),
 )
-# The functions that run both in memory.
+# Functions that solve in memory and return a run.
 solve_field, solve_body = SOLVES[0].run, SOLVES[1].run

@@ -1,4 +1,4 @@
-"""Bodies: equilibrium by Newton's method; stress and stiffness by automatic differentiation (jets) of the effects' energies."""
+"""Bodies: equilibrium by Newton's method; stress and stiffness by automatic differentiation (jets) of the energies of effects."""
 
 import logging
 import time
@@ -24,7 +24,7 @@ from fem_reference.solvers.scikit_fem.equations import Equations
 log = logging.getLogger(__name__)
 
 _HALVINGS = 10
-_ROUNDING = 1e-14  # of prescribed displacements, as a share of the body's size
+_ROUNDING = 1e-14  # of prescribed displacements, as a fraction of the body's size
 _GROWTH = 10.0  # the growth of the residual above which a Newton step is halved
 
 
@@ -67,7 +67,7 @@ def _check_known(body: Body) -> None:
 
 
 def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
-    """The states of ``body`` at its frames, as far as they can be reached."""
+    """Compute the states of ``body`` at its frames, up to the first that cannot be reached."""
     check(body, settings.element, settings.quadrature_degree)
     _check_known(body)
     begin = time.perf_counter()
@@ -128,7 +128,7 @@ class March:
         return attempt
 
     def _trouble(self, unknowns: Floats, frame: float) -> Trouble | None:
-        """The trouble with a state in equilibrium: cells inside out, or no energy."""
+        """The trouble with a state in equilibrium: cells inside out, or an energy that is not finite."""
         smallest = np.min(self.equations.smallest_determinants(unknowns))
         if not smallest > 0:
             return Trouble("inverted", f"det F fell to {smallest:.3g}")
@@ -137,7 +137,7 @@ class March:
         return None
 
     def _newton(self, frame: float) -> tuple[Attempt, Floats]:
-        """The record of Newton's method at ``frame``, and the unknowns (N,) that it ends with."""
+        """The record of Newton's method at ``frame``, and the last unknowns (N,)."""
         fixed, wanted = self.fixed(frame)
         free = np.setdiff1d(np.arange(len(self.unknowns)), fixed)
         start, allowed = self.unknowns.copy(), self.settings.newton_iterations

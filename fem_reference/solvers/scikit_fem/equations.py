@@ -14,12 +14,12 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body, Prescribed, is_stabilised
 from fem_reference.solvers.scikit_fem.spaces import DISPLACEMENT, PRESSURE, VARIABLES, Points, Space
 
-# The degree by the element's displacement: exact on a straight cell for an energy of second degree in the strain.
+# The quadrature degree for each displacement element: exact on a straight cell for an energy quadratic in the strain.
 QUADRATURE_DEGREE = {"P1": 2, "P2": 4, "Q1": 3, "Q2": 5}
 _AT_ONCE = 1024  # points, so that their jets fit in a cache
 
 Acting = list[tuple[Effect, float]]
-# A function of p points, their n variables and a frame: the first (p, n) and second (p, n, n) derivatives of the work.
+# A function of p points, their n variables and a frame: the first (n, p) and second (n, n, p) derivatives of the work.
 Law = Callable[[Points, list[Any], float], tuple[Floats, Floats]]
 
 
@@ -86,8 +86,8 @@ class Equations:
         return float((energy * self.inside.weights).sum() - stabilising)
 
     def _projection(self) -> Any:
-        """The matrix (N, N) of minus the energy of ``body.is_stabilised``: M - B^T D^-1 B, with the mass matrices M of the
-        pressure, D of a constant in each cell and B between the two, all divided by twice the shear modulus.
+        """The matrix (N, N) of minus the energy described at ``body.is_stabilised``: M - B^T D^-1 B, with the mass matrices M of
+        the pressure, D of a constant in each cell and B between the two, all divided by twice the shear modulus.
         """
         inside, entries = self.inside, self.inside.variables(np.zeros(self.space.size)).reshape(-1, VARIABLES)
         _, curvature = self._energy_law(inside, variables(entries.T), self.body.frames[0])
@@ -109,7 +109,7 @@ class Equations:
         return [(effect, effect.amount(frame)) for effect in self.body.effects]
 
     def _felt(self) -> list[int]:
-        """The variables on which the energies depend; the displacement itself is costly and seldom needed."""
+        """The indices of variables on which energies depend; the displacement itself is costly and seldom needed."""
         deformed = np.append(np.eye(3).ravel(), np.ones(4)) + 0.1 * np.sin(np.arange(VARIABLES))
         jets = variables(deformed[:, None])
         fibre = None if self.inside.fibre is None else self.inside.fibre[:1, 0]
@@ -127,7 +127,7 @@ class Equations:
         return energy.slope, energy.curvature
 
     def _at(self, points: Points, entries: list[Any], fibre: Floats | None) -> State:
-        """The state of ``points``, with their shares in regions in the shape of the ``entries``, or in one row."""
+        """The state of ``points``; shares of regions have the shape of the ``entries``, or are one row if these are jets."""
         cells = np.repeat(points.cells, points.places.shape[1])
         shares = self.body.shares(points.places.reshape(-1, 3), cells)
         shape = np.shape(entries[0]) if isinstance(entries[0], np.ndarray) else (-1,)

@@ -24,7 +24,7 @@ from fem_reference.runs.store import Frame, Outcome, Sink
 
 QUADRATURE_DEGREE = 8
 _SINGULAR = 1e15  # condition numbers above this leave no correct digit
-# By the number of corners of a cell: elements of orders 1 and 2.
+# Elements of orders 1 and 2, for each number of corners of a cell.
 _ELEMENTS = {2: (skfem.ElementLineP1, skfem.ElementLineP2), 3: (skfem.ElementTriP1, skfem.ElementTriP2)}
 
 
@@ -141,7 +141,7 @@ def _slope_weights(basis: Any) -> Floats:
 
 
 def order_of(problem: FieldProblem, basis: Any) -> Any:
-    """The unknown of scikit-fem that stands at each node of the problem."""
+    """The index (N,) of the unknown of scikit-fem at each node of the problem."""
     vertices = basis.nodal_dofs[0]
     if problem.order == 1:
         return vertices
@@ -155,7 +155,7 @@ def order_of(problem: FieldProblem, basis: Any) -> Any:
 
 
 def _fluxes(problem: FieldProblem) -> Floats:
-    """The flow (N,) through the boundary: the integral of k slope times each hat function, by Gauss's rule of 3 points."""
+    """The flow (N,) through the boundary: the integral of k slope times each hat function, by Gauss's 3-point rule."""
     b = np.zeros(len(problem.fixed))
     for flux in problem.fluxes:
         ends = problem.mesh.points[flux.facets]

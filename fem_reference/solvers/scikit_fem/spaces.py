@@ -21,7 +21,7 @@ VARIABLES = 13
 DISPLACEMENT = slice(9, 12)
 PRESSURE = 12
 _REST = np.append(np.eye(3).ravel(), np.zeros(4))
-# By kind of cell: meshes of degrees 1 and 2, then elements of degrees 0 to 2.
+# For each kind of cell: meshes of degrees 1 and 2, and elements of degrees 0 to 2.
 _MESHES = {"tetrahedron": (skfem.MeshTet1, skfem.MeshTet2), "hexahedron": (skfem.MeshHex1, skfem.MeshHex2)}
 _ELEMENTS = {
     "tetrahedron": (skfem.ElementTetP0, skfem.ElementTetP1, skfem.ElementTetP2),
@@ -31,10 +31,10 @@ _ELEMENTS = {
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points of integration, q in each of m ``cells`` (m,): their ``places`` (m, q, 3) [mm] and ``weights`` (m, q) [mm3 or mm2],
-    the ``values`` (m, q, k) and ``slopes`` (m, q, 3, k) of the k functions of the displacement, the values ``pressures`` (m, q, l)
-    of the l functions of the pressure, and the unknowns ``dofs`` (m, 3 k + l); on facets the outward unit ``normals`` (m, q, 3),
-    and in a body with fibres their directions ``fibre`` (m, q, 3).
+    """Quadrature points, q in each of m ``cells`` (m,): their ``places`` (m, q, 3) [mm] and ``weights`` (m, q) [mm3 or mm2], the
+    ``values`` (m, q, k) and ``slopes`` (m, q, 3, k) of k basis functions of the displacement, the values ``pressures`` (m, q, l)
+    of l basis functions of the pressure, and the numbers ``dofs`` (m, 3 k + l) of unknowns; on facets the outward unit ``normals``
+    (m, q, 3), and in a body with fibres their directions ``fibre`` (m, q, 3).
     """
 
     cells: Ints
@@ -87,8 +87,8 @@ class Space:
         self.mesh = _MESHES[kind][cells.degree - 1](cells.points.T.copy(), here.T.astype(np.int32))
         rule = get_quadrature(self.nodal.refdom, degree)
         self.basis = skfem.Basis(self.mesh, self.nodal, quadrature=rule)
-        self.rest: Floats = np.asarray(self.basis.doflocs.T)  # (N, 3) [mm] of the nodes of the displacement
-        self.nodes: Ints = np.empty(len(cells.points), np.int64)  # of the displacement, by node of the mesh
+        self.rest: Floats = np.asarray(self.basis.doflocs.T)  # (N, 3) [mm], nodes of the displacement
+        self.nodes: Ints = np.empty(len(cells.points), np.int64)  # for each node of the mesh, its number in rest
         self.nodes[here] = self.basis.element_dofs[: here.shape[1]].T
         self.pressure = None
         if pressure is not None:
@@ -98,7 +98,7 @@ class Space:
 
     @cached_property
     def inside(self) -> Points:
-        """The points of the quadrature of all cells."""
+        """The quadrature points of all cells."""
         return self._points(skfem.Basis, get_quadrature(self.nodal.refdom, self.degree))
 
     @cached_property
@@ -124,12 +124,12 @@ class Space:
         return np.unique(self.basis.get_dofs(self.facets(region)).all())
 
     def surface(self, region: str) -> Points:
-        """The points of the quadrature of the facets of ``region``."""
+        """The quadrature points of the facets in ``region``."""
         rule = get_quadrature(self.nodal.refdom.brefdom, self.degree)
         return self._points(skfem.FacetBasis, rule, facets=self.facets(region))
 
     def _points(self, kind: Any, rule: tuple[Floats, Floats], **where: Ints) -> Points:
-        """The points of a ``rule`` on a ``kind`` of basis of scikit-fem; ``where`` has the ``facets`` if the basis is on facets."""
+        """The points of a quadrature ``rule`` for a ``kind`` of basis; ``where`` has the ``facets`` if the basis is on facets."""
         own, *others = (
             kind(self.mesh, basis.elem, quadrature=rule, dofs=basis.dofs, disable_doflocs=True, **where)
             for basis in (self.basis, self.pressure)

@@ -141,9 +141,9 @@ def test_a_point_left_out_pulls_at_no_bone() -> None:
     [
         ({"joint": "knee", "within": ["0 rad", "1 rad"]}, r'via\[0\]\.joint: got "knee", want one of hinge'),
         ({}, '"joint" together with "within" or "curve", and only then'),
-        ({"within": ["1 rad", "1 rad"]}, '"within" from an angle to a greater one'),
-        ({"curve": curve((0.0, [5, 1, 12]))}, '"curve" of at least two points, by growing angle'),
-        ({"curve": curve((1.0, [5, 1, 12]), (0.0, [5, 2, 12]))}, '"curve" of at least two points, by growing angle'),
+        ({"within": ["1 rad", "1 rad"]}, '"within" from an angle to a larger angle'),
+        ({"curve": curve((0.0, [5, 1, 12]))}, '"curve" of at least two points, in order of'),
+        ({"curve": curve((1.0, [5, 1, 12]), (0.0, [5, 2, 12]))}, '"curve" of at least two points, in order of'),
     ],
 )
 def test_points_that_are_refused(changed, message) -> None:

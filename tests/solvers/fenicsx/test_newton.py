@@ -52,7 +52,7 @@ def test_what_is_not_a_number_is_refused_at_once() -> None:
     assert np.isnan(found.residuals[0])
     assert (
         found.detail
-        == "Newton's method reached a state where a law, or a prescribed path, has no value in 0 iterations"
+        == "Newton's method reached in 0 iterations a state where a law, or a prescribed path, has no value"
     )
 
 

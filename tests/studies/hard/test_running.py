@@ -61,7 +61,7 @@ def test_a_bone_that_contact_does_not_hold_is_no_success() -> None:
     found = cell("bones.erleben_wedge", "fenicsx")
     assert found.verdict == "no solution"
     assert "converged, but contact gives way: the surface is " in found.sentence
-    assert 'mm deep in "wedge", whose middle is at 0.5 mm' in found.sentence
+    assert 'mm deep in "wedge", whose middle is 0.5 mm deep' in found.sentence
 
 
 @pytest.mark.slow
