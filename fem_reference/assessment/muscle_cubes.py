@@ -1,4 +1,4 @@
-"""Cubes of muscle under load: quantities measured in experiments, and the same quantities of a material."""
+"""Cubes of muscle under load: quantities measured in experiments, and the same quantities computed for a material."""
 
 import math
 from collections.abc import Callable
@@ -41,7 +41,7 @@ class Quantity:
 
 
 def with_collagen(fibres: float, k1: float, k2: float) -> Material:
-    """The shipped matrix with ``collagen_across`` of ``k1`` [MPa] and ``k2``, with the stress ``fibres`` [MPa] of its fibres."""
+    """The shipped matrix with ``collagen_across`` of ``k1`` [MPa] and ``k2``, and fibres with the stress ``fibres`` [MPa]."""
     passive = make("fibre_passive", **(FIBRES | {"stress": fibres}))
     return (*SHIPPED[:2], passive, make("collagen_across", k1=k1, k2=k2))
 

@@ -49,7 +49,7 @@ class Ranking:
 
 
 def ranked(deviations: Iterable[Deviation]) -> tuple[Ranked, ...]:
-    """The places of ``deviations``: one is less than another if their bars do not overlap; NaN comes last.
+    """The places of ``deviations``: two differ in rank if their bars do not overlap; NaN comes last.
 
     >>> [place.rank for place in ranked([Deviation("a", 5.0, 0.4), Deviation("b", 2.0, 0.4), Deviation("c", 2.5, 0.4)])]
     ['1 to 2', '1 to 2', '3']

@@ -59,8 +59,8 @@ def _file() -> _File:
 @dataclass(frozen=True, eq=False)
 class SolverResult:
     """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] if known, and ``measures`` against
-    the reference; for the reference itself its error bars, empty if these were not requested. ``needs``: the parameters that a user
-    must give, by kind; empty if that is not known. ``unsound``: the reason why its frames are unusable, else empty.
+    the reference; for the reference itself its error bars, empty if these were not requested. ``needs``: the number of parameters
+    that a user must give, by kind; empty if unknown. ``unsound``: the reason why its frames are unusable, else empty.
     """
 
     kind: str
@@ -84,7 +84,7 @@ class SolverResult:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A scene: ``title``, ``triangles`` of the muscle, greatest displacement ``travel`` [mm] and outcome of the reference."""
+    """A scene: ``title``, ``triangles`` of the muscle, maximum displacement ``travel`` [mm] and outcome of the reference."""
 
     case: str
     title: str
