@@ -17,7 +17,7 @@ from scipy.spatial.distance import cdist
 from fem_reference.foundations.mesh import Floats
 
 _GROUPS = 10  # the number of groups of runs, each left out in turn
-_LENGTHS, _NOISE = (0.2, 40.0), (1e-10, 0.1)  # limits: lengths for variables from -1 to 1; noise in variances about the trend
+_LENGTHS, _NOISE = (0.2, 40.0), (1e-10, 0.1)  # limits; the noise is in variances about the trend
 _START = 1.0, 1e-4
 _LEAST = 1e-24  # the least variance about the trend, as a fraction of the outputs' squares: the trend may reproduce them exactly
 _SAMPLES = 13  # the number of samples, as a power of 2

@@ -8,15 +8,15 @@ from pydantic import Field
 from fem_reference.effects import Energy, Moduli, State
 from fem_reference.foundations.units import PositivePressure
 
-# The cosines of twice the angle, evenly over half a turn; Python floats, as numpy floats would turn symbols into arrays.
+# The cosines of twice the angles, spread evenly over half a turn; Python floats, as numpy floats would turn symbols into arrays.
 _DIRECTIONS = 8
 COSINES = [float(np.cos((j + 0.5) * np.pi / _DIRECTIONS)) for j in range(_DIRECTIONS)]
-# The square root has no derivative at 0, so this share of the squared mean is added to the squared spread.
+# The square root has no derivative at 0, so this fraction of the squared mean is added to the squared spread.
 _ROUNDING = 1e-13
 
 
 class CollagenAcross(Energy):
-    """The mean over all directions a across the fibre of ``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` while ``I = J^(-2/3) a . C a`` is
+    """The mean over all directions a across the fibre of ``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` where ``I = J^(-2/3) a . C a`` is
     above 1, else 0.
 
     ``k1`` [MPa], ``k2`` without unit. In the plane across the fibre, I is ``mean + spread cos(2 angle)``. There the mean is half
