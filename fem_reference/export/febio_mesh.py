@@ -28,7 +28,7 @@ FACING = [0, 2, 1, 5, 4, 3]  # the nodes of a tri6 whose normal is reversed
 # Springs at points are small rigid triangles of this fraction of the points' tributary areas, by which their penalty is divided.
 SHRUNK = 0.01
 _LEAST_AREA = 1e-6  # a point with less than this fraction of the largest area has no spring
-_CLEAR = 0.005  # barycentric distance of these triangles from the edges of their facet, so that no projected ray misses it
+_CLEAR = 0.005  # barycentric distance of these triangles from the edges of their facet, so that no ray misses it
 
 
 def leaf(parent: Element, tag: str, text: object, **attributes: str) -> None:

@@ -100,7 +100,7 @@ def check_used(known: Sequence[str], uses: Sequence[tuple[str, str]], place: str
             raise InputError(join(place, key), f'"{name}"', want)
 
 
-_SHOWN = 12  # the greatest number of errors that are shown for a file
+_SHOWN = 12  # the maximum number of errors that are shown for a file
 _LONGEST_NAME = 100
 # A name in pages and messages.
 Name = Annotated[str, AfterValidator(check_name)]

@@ -1,4 +1,4 @@
-"""Fibres by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves evenly over the other.
+"""Fibres spread by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves at the other.
 
 The flux per area of an attachment is constant, so lines that start evenly over one attachment end evenly over the other, and cover
 both areas. In contrast, the gradient of a potential that is constant on attachments is concentrated at their rims. In a sheet with
@@ -25,9 +25,9 @@ from fem_reference.foundations.mesh import (
 )
 from fem_reference.geometry.fibres import POINTS, FibreField, averaged, resample, spread
 
-MOST = 1000  # the greatest number of fibres
-_LINES, _LINES_EACH = 1000, 8  # the least number of lines in all, and per fibre; fibres are chosen among these lines
-_ROUNDS = 50  # the largest number of iterations of Lloyd's algorithm, which converges in fewer
+MOST = 1000  # the maximum number of fibres
+_LINES, _LINES_EACH = 1000, 8  # the minimum number of lines in all, and per fibre; fibres are chosen among these lines
+_ROUNDS = 50  # the maximum number of iterations of Lloyd's algorithm, which converges in fewer
 _PLASTIC = 1.324717957244746  # x^3 = x + 1: its powers spread points evenly (Roberts 2018, the R2 sequence)
 
 
@@ -107,7 +107,7 @@ def _numbers(triangles: Ints, facets: Ints) -> Ints:
 
 
 def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:
-    """``count`` places (n, 3) [mm], spread evenly over the area where the flow begins, and the tetrahedron (n,) of each."""
+    """``count`` points (n, 3) [mm], spread evenly over the area where the flow begins, and the tetrahedron (n,) of each."""
     mesh, facets = flux.mesh, flux.start
     shares = np.cumsum(triangle_areas(mesh.points, facets))
     facet = np.searchsorted(shares / shares[-1], (np.arange(count) + 1 / _PLASTIC) / count)  # never on a facet's rim

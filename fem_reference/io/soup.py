@@ -20,7 +20,7 @@ def arrays(soup: Soup) -> tuple[Floats, Ints]:
         raise ValueError("no vertices")
     if points.shape != (len(points), 3):
         raise ValueError(f"points of shape {points.shape}")
-    with np.errstate(invalid="ignore"):  # NaN becomes some integer, which the comparison below finds
+    with np.errstate(invalid="ignore"):  # NaN becomes some integer, which the comparison below detects
         triangles = np.asarray(soup[1], np.int64)
     if triangles.shape != (len(triangles), 3) or (triangles != corners).any():
         raise ValueError(f"corners of shape {corners.shape} that are not three point numbers each")

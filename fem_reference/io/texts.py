@@ -1,6 +1,6 @@
 """TOML, JSON and XML from untrusted files: bounded in size and depth, so that reading always ends.
 
-A file is refused if it cannot be parsed, is too large, is nested too deeply, or refers to files outside its folder.
+A file is rejected if it cannot be parsed, is too large, is nested too deeply, or refers to files outside its folder.
 """
 
 import json
@@ -18,10 +18,10 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 
-# The largest size of a file in bytes: a case file has some kB, a baseline 1.3 kB per frame. The values need up to 30 times as much.
+# The maximum size of a file in bytes: a case file has some kB, a baseline 1.3 kB per frame. Reading takes up to 30 times the memory.
 MOST_TOML = 2**21
 MOST_JSON = 2**25
-# The largest number of levels of nested tables and lists; case files have up to 6.
+# The maximum number of levels of nested tables and lists; case files have up to 6.
 DEEPEST = 32
 # A mesh file may not define entities: they can multiply a text a billion times, or include other files.
 _FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")
