@@ -18,7 +18,7 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 
-# The maximum size of a file in bytes: a case file has some kB, a baseline 1.3 kB per frame. Reading takes up to 30 times the memory.
+# The maximum size of a file in bytes: a case file has some kB, a baseline 1.3 kB per frame. In memory it takes up to 30 times this.
 MOST_TOML = 2**21
 MOST_JSON = 2**25
 # The maximum number of levels of nested tables and lists; case files have up to 6.
