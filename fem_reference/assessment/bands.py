@@ -31,7 +31,7 @@ class Design:
 
     @property
     def refused(self) -> str:
-        """The reason why these runs are too few for a band, empty if they are not."""
+        """The reason why these runs are too few for a band, empty if they are enough."""
         made, variables = len(self.points), self.points.shape[1]
         if made < 2 * (variables + 1):
             return f"{made} runs have results, but {variables} parameters need at least {2 * (variables + 1)}"

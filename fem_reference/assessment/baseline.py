@@ -32,7 +32,7 @@ POSITION_PLACES = 2
 POSITION_ROUNDING = math.sqrt(3) * 0.5 * 10**-POSITION_PLACES
 # The number of sampled vertices, which take about 1.3 kB per frame. Motion of other vertices is visible only in the statistics.
 SAMPLED = 64
-# The tolerance of positions [mm] in a new baseline, far below visible differences. If machines differ more, it must be larger.
+# The tolerance of positions [mm] in a new baseline, far below visible differences. It must be larger if machines differ more.
 MOVED = 0.1
 # The tolerance of a statistic is at most this fraction of its maximum over the frames.
 SHARE = 0.02

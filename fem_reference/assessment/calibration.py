@@ -19,7 +19,7 @@ from fem_reference.io.texts import plain
 
 COLUMNS = ("frame", "quantity", "value", "unit", "sd")
 CONFIDENCE = 0.95
-# Fractions of a parameter's range: the step of finite differences, and the distance from an end within which a value is at it.
+# Fractions of a parameter's range: the step of finite differences, and the distance within which a value counts as at an end.
 _STEP, _AT = 1e-3, 1e-3
 # Two estimates whose errors are correlated by more than this are reported as a pair.
 _CORRELATED = 0.95

@@ -41,7 +41,7 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """Meshes, or steps in time, from coarse to fine.
+    """Meshes or time steps, from coarse to fine.
 
     ``counts``: numbers of cells or steps, each of ``size / count`` [mm] or [s]. The theoretical ``order`` of the error must be met
     to within 0.5; None: no order is measured. If ``extrapolated``, the value is extrapolated from the last two counts, for an
@@ -77,8 +77,8 @@ class Entry:
 
     An entry of the kind "experiment" compares a model with a muscle: its verdict is "within" or "outside" the uncertainty of the
     experiment, and neither is a failure. It fails if the value no longer equals ``pinned``. ``facts``: the measured numbers from
-    which its truth is computed; ``is_order``: True for a stiffness ranking, whose value is 1 if reproduced, else 0, within
-    0.5; ``from_memory``: True if a part of its model or of its source is recalled, not checked against the publication.
+    which its truth is computed; ``is_order``: True for a stiffness ranking: the value is 1 if it is reproduced, else 0,
+    and the tolerance 0.5; ``from_memory``: True if a part of its model or source is recalled, not checked in the publication.
     """
 
     name: str

@@ -42,7 +42,7 @@ class Comparison:
     """The runs of a case with their measures and verdicts. ``setup``: the muscle's ``Setup`` or the ``FieldProblem``.
     ``deviations``: by candidate name, its measures against the reference. ``changes``: by run name (also ``"reference"``), its
     measures against the rest state; for a field, which has no rest state, measures without a reference. ``extension_error`` [mm]:
-    by frame, the maximum error of fibre lengths that are extended from the reference's surface, None without an extension.
+    by frame, the maximum error of fibre lengths extended from the reference's surface, None without an extension.
     ``error_bars``: bars of the reference, None if not computed; ``ladders``: its convergence on refined meshes, if measured.
     """
 

@@ -26,7 +26,7 @@ _WANT = "a study written by the verb study"
 @dataclass(frozen=True, eq=False)
 class CaseStudy:
     """The points of a case. ``units`` of errors, and ``bars``, the error bars of the truth, by ``metric.statistic``; ``truth``: a
-    description of it; ``claims``: error bars of coarser references, with their errors; ``triangles``: the surface's number of them;
+    description; ``claims``: error bars of coarser references, with their errors; ``triangles``: the number of surface triangles;
     ``travel`` [mm]: the maximum displacement of the truth; ``features`` of the case, as far as its scene states them
     (:mod:`studies.features`); ``truth_key``: the folder of the truth's run in a store, "" if it is not known.
     """

@@ -26,7 +26,7 @@ Grade = Literal["validated", "indicative", "outside", "verified only", "not comp
 
 class Evidence(Record):
     """The stated evidence of a quantity: ``verified``, the groups of the catalogue that verify it; ``closed_forms`` and
-    ``other_codes``, in words; the numerical ``bar``; ``band``, facts about models; ``experiments``, described in ``compared``.
+    ``other_codes``, in words; the numerical ``bar``; ``band``, facts on models; ``experiments``, described in ``compared``.
     """
 
     name: str
@@ -55,8 +55,8 @@ def claims() -> tuple[Evidence, ...]:
 class Beside:
     """A value of the model compared with a known value, both in ``unit``. ``truth``: the known value; ``within``: its uncertainty;
     ``n``: the number of specimens, None if unknown. ``validates``: True if agreement counts as validation. ``rests_on``: the text
-    in which the truth was read, and the unmeasured parts of truth or model. ``kind``: measurement, or model if another model is the
-    truth. ``is_order``: True for a stiffness ranking, whose value is 1 if reproduced, else 0, within 0.5.
+    in which the truth was read, and notes on a chosen tolerance and a recalled model. ``kind``: measurement, or model if another
+    model is the truth. ``is_order``: True for a stiffness ranking: the value is 1 if it is reproduced, else 0, the tolerance 0.5.
     """
 
     name: str

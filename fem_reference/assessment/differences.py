@@ -57,7 +57,7 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
 
     By the triangle inequality, changes of the same points differ by at most their deviation. They differ by less, as most of the
     deviation is not along the displacement, or cancels. A single statistic does not show by how much less: its difference may be
-    small by chance, especially at the worst point. A quantile or a maximum belongs to one point, which can be any: nothing
+    small by chance, especially at the worst point. A quantile or a maximum belongs to one point, whichever it is: nothing
     cancels there, and no quantile of the deviation bounds it. So its difference is at least the rms distance over points.
     """
     metrics = [metric for metric, _ in names]

@@ -2,7 +2,7 @@
 
 There are two kinds of bars. The bar of a candidate's deviation from the reference is the deviation of the reference's runs from
 each other: by the triangle inequality, another reference changes the candidate's deviation by at most this amount. The bar of the
-reference's change from rest is the fraction of these deviations by which the changes of its runs differ. The bars of a body are
+reference's change from rest is the part of these deviations by which the changes of its runs differ. The bars of a body are
 differences of its states.
 """
 
@@ -243,7 +243,7 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
 
 @dataclass(frozen=True, eq=False)
 class BodyBars:
-    """Error bars of a body at ``frames`` (f,): distances from its states on ever finer cells of the same shape. ``points`` (f, n)
+    """Error bars of a body at ``frames`` (f,): distances from its states in the limit of fine cells. ``points`` (f, n)
     [mm], ``energy`` (f,) [N mm], and by name of each constraint or bone the vectors ``forces`` (f,) [N] and ``moments`` (f,)
     [N mm]; NaN if unknown. ``displacement`` (f,): the bar of the displacement divided by the displacement, both rms over the nodes.
     ``sharper``: the more accurate solution, in words.

@@ -16,8 +16,8 @@ class CurveError:
 
 @dataclass(frozen=True)
 class HeightError:
-    """A fit by Gaussians, with a number of ``centres`` of a ``choice``, to the heights of every second vertex of an attached area
-    above its plane: the rms error [mm] at the other vertices, and the ``condition`` number of the matrix.
+    """A fit by Gaussians to the heights, above its plane, of every second vertex of an attached area: the number of ``centres``,
+    the ``choice`` of their positions, the rms error [mm] at the other vertices, and the ``condition`` number of the matrix.
     """
 
     case: str

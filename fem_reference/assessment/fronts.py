@@ -93,8 +93,8 @@ def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
 
 @dataclass(frozen=True)
 class Price:
-    """The price of accuracy of a ``solver``: ``factor``, the ratio of the cost at half an error to the cost at the error, on its
-    front, NaN if more cost does not reduce the error; the ``best`` and ``worst`` errors of the front, which has ``count`` points;
+    """The price of accuracy of a ``solver``: ``factor``, by which the cost on its front grows if the error is
+    halved, NaN if more cost does not reduce the error; the ``best`` and ``worst`` errors of the front, which has ``count`` points;
     ``nearest``: the point with the best error.
     """
 

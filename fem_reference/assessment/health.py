@@ -24,8 +24,8 @@ class Followed:
     """A run whose health is measured. ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame
     ``numbers``; for a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3). ``bones``: bones with which ``free``
     (n,) vertices may be in contact. ``truth`` (f, n, 3): the same vertices in the reference, if it has them. ``integrated`` (f,),
-    of several bodies (f, b): V/V0 from the solver. If known, ``negative_modes`` (f,), ``material_modes`` (f,), the negative modes
-    that the material certainly has, and ``least_determinant`` (f,), the least det F. For a scalar field its ``values`` (f, N) and
+    for several bodies (f, b): V/V0 from the solver. If known: numbers of ``negative_modes`` (f,) and ``material_modes`` (f,), those
+    certainly due to the material, and ``least_determinant`` (f,), the least det F. For a scalar field its ``values`` (f, N) and
     the ``range`` of its boundary values. ``spans``: the slices of arrays that belong to each of several bodies.
     """
 
@@ -123,7 +123,7 @@ def from_first(run: Followed) -> Found:
 
 
 def from_reference(run: Followed) -> Found:
-    """Maximum distance of a vertex from the vertex in the reference, in per cent of the body's size; NaN without a reference."""
+    """Maximum distance of a vertex from its place in the reference, in per cent of the body's size; NaN without a reference."""
     return _off(run, np.full(run.positions.shape, np.nan) if run.truth is None else run.truth)
 
 
@@ -148,7 +148,7 @@ def penetration(run: Followed) -> Found:
 
 
 def passed(run: Followed) -> Found:
-    """Maximum depth of a free vertex inside a bone on its straight path, relative to the bone, from the previous frame, in per
+    """Maximum depth of a free vertex inside a bone on the vertex's straight path, relative to the bone, from the last frame, in per
     cent of the body's size. It detects a bone that crosses the body and is outside in both frames.
     """
     depths = np.zeros(run.positions.shape[:2])
@@ -170,7 +170,7 @@ def _deepest(run: Followed, depths: Floats) -> Found:
 
 
 def pierced(run: Followed) -> Found:
-    """Maximum depth of a bone's vertex in the body, in per cent of the body's size: thin bones fit between vertices of a body."""
+    """Maximum depth of a bone's vertex in the body, in per cent of the body's size: thin bones fit between its vertices."""
     values, places = np.zeros(len(run.numbers)), np.tile(run.surface.points[0], (len(run.numbers), 1))
     for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
         body = run.surface.moved_to(points)

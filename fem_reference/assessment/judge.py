@@ -30,7 +30,7 @@ _KINDS = {
     "kPa": ("a pressure", 1000.0),
     "1": ("a number", 1.0),
 }
-_LOW = 0.1  # det F below which a state is hardly valid
+_LOW = 0.1  # det F below which a state is doubtful
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def overall(words: Iterable[Word]) -> Word:
 
 
 def doubts(reference: Run) -> list[str]:
-    """Reasons to doubt a reference, in words: missing frames, instability, near inversion, laws out of range, lost energy."""
+    """Reasons to doubt a reference, in words: missing frames, instability, near inversion, laws out of range, energy gaps."""
     said = [] if reference.outcome.status == "converged" else [str(reference.outcome.status)]
     modes = reference.scalars.get("negative_modes")
     unstable = 0 if modes is None else int((np.nan_to_num(modes) > 0).sum())

@@ -24,7 +24,7 @@ SHIPPED: Material = (make("neo_hooke", mu=0.01), VOLUME, make("fibre_passive", *
 class Quantity:
     """A measured quantity of a cube: its ``truth`` in ``unit`` from ``facts`` of an ``experiment``, its uncertainty ``within`` and
     the reason for it (``because``); ``of``: its value for a material. ``limit``: the reason why the shipped law cannot reach the
-    truth. ``is_order``: True for a stiffness ranking, whose value is 1 if reproduced, else 0, within 0.5.
+    truth. ``is_order``: True for a stiffness ranking: the value is 1 if it is reproduced, else 0, the tolerance 0.5.
     """
 
     name: str

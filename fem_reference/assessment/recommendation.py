@@ -15,9 +15,9 @@ from fem_reference.foundations.errors import InputError
 
 TIME = "seconds_per_frame"
 Features = Mapping[str, float]  # the features of a case, by name
-# The number of other cases, the most similar ones, that are used.
+# The number of most similar other cases that are used.
 _ALIKE = 3
-# Margins are chosen so that this fraction of the values expected from other cases is met on the cases that are left out in turn.
+# Margins are such that this fraction of the values measured on left-out cases stays within the values expected from the others.
 _MET = 0.95
 # The features that determine similarity.
 _COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
@@ -91,8 +91,8 @@ def recommend(
 
 
 def chosen(known: Sequence[Expected], limits: Mapping[str, float]) -> tuple[Expected | None, Expected | None]:
-    """The cheapest setting whose error is at most ``limits["error"]``, or the most accurate whose time per frame [s] is at most
-    ``limits["time"]``, with both limits the cheapest within both. If there is none, the setting that misses the limits least.
+    """The best setting within ``limits`` and, if there is none, the setting that misses them least. With a limit ``"error"``, the
+    best is the cheapest; with a limit ``"time"`` [s] per frame alone, the most accurate.
     """
     most = {"error": math.inf, "time": math.inf} | dict(limits)
     fitting = [one for one in known if one.error <= most["error"] and one.time <= most["time"]]
@@ -132,8 +132,8 @@ def _is_same(one: Features, other: Features) -> bool:
 
 
 def alike(features: Features, studies: Iterable[CaseStudy]) -> list[CaseStudy]:
-    """The studies of the cases most similar to a case with these features, the most similar first: with the least sum of the ratios
-    of features in powers of two. Cases with and without contact are far apart.
+    """The studies of the cases most similar to a case with these features, the most similar first: with the least sum of
+    absolute logarithms of the ratios of features. Cases with and without contact are far apart.
     """
 
     def distance(study: CaseStudy) -> float:
@@ -230,7 +230,7 @@ def is_elsewhere(point: Point) -> bool:
 
 
 def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
-    """The ratio of a point's size of tetrahedra to the case's, both before refinement, and the number of refinements fewer."""
+    """The ratio of a point's size of tetrahedra to the case's, both before refinement, and the case's refinements minus its own."""
     scene = point.choice["scene"]
     size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
     return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]

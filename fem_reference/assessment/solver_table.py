@@ -18,7 +18,7 @@ FILE = Path(__file__).with_suffix(".toml")
 
 class SolverKind(Record):
     """A row of the report's table: its ``name``, the ``form`` of its model, the report's ``speed`` and ``precision`` in plus and
-    minus signs, the numbers of its ``literature`` in the report, and ``of_case``, names of candidates of cases that represent it.
+    minus signs, the numbers of its ``literature`` in the report, and ``of_case``, the names of candidates that represent it.
     """
 
     name: str
@@ -130,7 +130,7 @@ class Table:
         return list(dict.fromkeys(one.name for one in self.results if one.kind == kind))
 
     def needs(self, kind: str, name: str) -> Mapping[str, int]:
-        """The parameters that ``name`` needs on the scene that needs most; empty if they are not known."""
+        """The number of parameters, by kind, that ``name`` needs on the scene that needs most; empty if unknown."""
         found = [one.needs for one in self._by(kind, name)]
         return max(found, key=lambda needs: sum(needs.values()), default={})
 

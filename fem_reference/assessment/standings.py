@@ -67,7 +67,7 @@ class Standing(Record):
         return (self.truth, self.run, self.protocol) == (truth, run, PROTOCOL)
 
     def kept(self, missing: bool) -> "Standing":
-        """The row as it is kept if its case was not measured again; ``missing``: True if this was not possible."""
+        """The row if its case was not measured again; ``missing``: True if measuring it was not possible."""
         return self.model_copy(update={"stale": self.stale or missing or self.protocol != PROTOCOL})
 
     def asked(self, only: Collection[str]) -> bool:
@@ -120,7 +120,7 @@ class OverCases:
 
     @classmethod
     def of(cls, rows: Sequence[Standing]) -> "OverCases":
-        """The rows of one solver together."""
+        """The summary of the ``rows`` of one solver."""
         sound = [row for row in rows if not row.failed]
         shares = [value for row in sound if math.isfinite(value := _error(row, SHARE))]
         times = [row.seconds_per_frame for row in sound if row.seconds_per_frame is not None]

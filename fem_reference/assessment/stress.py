@@ -18,7 +18,7 @@ VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 
 class Bound(Record):
-    """A bound of healthy runs: a ``quantity`` of ``assessment.health`` is at most ``at_most``, at every or the ``last`` frame."""
+    """A bound that healthy runs meet: a ``quantity`` of :mod:`health` is at most ``at_most`` in every or the ``last`` frame."""
 
     quantity: str
     at_most: float = Field(ge=0)

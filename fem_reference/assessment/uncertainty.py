@@ -17,7 +17,7 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of a case by its ``key``, its ``title`` in words, its value in the case (``nominal``) and its range, in ``unit``."""
+    """A parameter of a case: its ``key``, its ``title`` in words, its value in the case (``nominal``) and range, in ``unit``."""
 
     key: str
     title: str

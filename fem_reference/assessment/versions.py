@@ -33,7 +33,7 @@ class Change:
 
     @property
     def further(self) -> Floats:
-        """The increase of the distance (f,), negative if it is nearer; infinite if only one of the values is a number."""
+        """The increase of the distance (f,), negative if it fell; infinite if only one of the values is a number."""
         lost, found = np.isnan(self.now) & ~np.isnan(self.was), np.isnan(self.was) & ~np.isnan(self.now)
         further = np.abs(self.now) - np.abs(self.was)
         return np.where(lost, np.inf, np.where(found, -np.inf, further))

@@ -26,7 +26,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     either = "a candidate of the case or a folder of frames"
     parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=either)
     share(parser, "--unit")
-    one = "the muscle to judge, in a case with several; the reference solves all together, a candidate each separately"
+    one = "the muscle to judge, if the case has several; the reference solves them together, a candidate one by one"
     parser.add_argument("--muscle", default="", metavar="NAME", help=one)
     past = "JSON file of the candidate's earlier measures"
     parser.add_argument("--baseline", type=Path, required=True, metavar="FILE", help=past)

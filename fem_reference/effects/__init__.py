@@ -198,7 +198,7 @@ class Load(Effect):
 
 
 class Interaction(Effect):
-    """An effect between a body and the bones or muscles around it, made by a problem from a scene."""
+    """An effect between a body and the bones or muscles around it, which a problem formulates."""
 
 
 class Prestrain(Effect):

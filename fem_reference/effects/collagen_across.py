@@ -20,7 +20,7 @@ class CollagenAcross(Energy):
     above 1, else 0.
 
     ``k1`` [MPa], ``k2`` without unit. In the plane across the fibre, I is ``mean + spread cos(2 angle)``. There the mean is half
-    the trace of C, and ``mean^2 - spread^2`` its determinant. Eight angles are summed.
+    the trace of ``J^(-2/3) C``, and ``mean^2 - spread^2`` its determinant. Eight angles are summed.
 
     Source: integration over the directions of collagen, as in Bleiler, Ponte Castaneda and Roehrle 2019, doi
     10.1016/j.jmbbm.2019.05.012, for muscle, which is then stiffer in tension across its fibres than along them; here only

@@ -12,7 +12,7 @@ class Tendon(Interaction):
     this tendon on the bone.
 
     ``on``: the attachment; ``stiffness`` [N/mm]: the stiffness of all lines together, ``E A / l0`` for a tendon of modulus E and
-    cross-section A; each line has a part k, in proportion to area; ``reach`` [mm]. A tendon is slack at rest and excluded with
+    cross-section A; each line has a stiffness k in proportion to area; ``reach`` [mm]. A tendon is slack at rest and excluded with
     ``in_situ``. Source: Zajac 1989 (Crit. Rev. Biomed. Eng. 17:359), the tendon as a spring in series, here linear.
     """
 

@@ -11,7 +11,7 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 class MuscleContact(Interaction):
     """The pressure law of ``contact``, applied equally to both sides of the gap between two muscles, or between parts of a single
-    muscle, with any amount of sliding (``fem_reference.problems.touching.Touching``).
+    muscle, with finite sliding (``fem_reference.problems.touching.Touching``).
 
     ``stiffness`` [MPa/mm]: under the pressure p the two sides overlap by at most p / stiffness. ``smoothing`` [mm]: the distance at
     which contact begins, and the maximum overlap of two muscles, or of a muscle with itself, that is allowed at rest.

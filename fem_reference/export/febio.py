@@ -105,7 +105,7 @@ def model(problem: MuscleProblem) -> Element:
 
 
 def _control(root: Element, problem: MuscleProblem) -> None:
-    """Add the control of steps from frame to frame, which are at most ``LONGEST_STEP`` long, and shorter where FEBio needs it."""
+    """Add the control of steps, which are at most ``LONGEST_STEP`` long, shorter where FEBio needs it, and end at each frame."""
     control, step = SubElement(root, "Control"), _step(problem)
     steps = round((problem.frames[-1] - problem.frames[0]) / step)
     settings = {"analysis": "STATIC", "time_steps": steps, "step_size": step}

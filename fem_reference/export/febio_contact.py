@@ -128,6 +128,6 @@ def _overlapping(problem: MuscleProblem) -> Iterator[str]:
             assert problem.contact is not None  # as overlaps are only reported with contact
             yield (
                 f'bone "{bone}": facets of the tetrahedra are up to {deep:.2g} mm inside at rest. FEBio removes this overlap in '
-                f"its first step, the reference before. With a search_radius of {radius:.2g} mm, FEBio ignores contact at deeper "
-                f"points, whose pressure exceeds {problem.contact.stiffness * radius:.2g} MPa"
+                f"its first step, the reference before it starts. With a search_radius of {radius:.2g} mm, FEBio ignores contact "
+                f"at deeper points, whose pressure exceeds {problem.contact.stiffness * radius:.2g} MPa"
             )

@@ -82,7 +82,7 @@ def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
 
 
 def outward(surface: Surface) -> Surface:
-    """The surface with its normals pointing out of it."""
+    """The surface with outward normals."""
     turned = enclosed_volume(surface.points, surface.triangles) < 0
     return Surface(surface.points, surface.triangles[:, ::-1]) if turned else surface
 

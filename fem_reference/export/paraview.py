@@ -44,7 +44,7 @@ _BARS = {"error_bar": "max", "error_bar_of_surface": "hausdorff"}
 
 
 def write(comparison: Comparison, folder: Path) -> list[str]:
-    """Write the runs of a muscle into ``folder``, completely or not at all; returns file names. InputError if it is not free."""
+    """Write the runs of a muscle into a free ``folder``, completely or not at all, and return the file names; else InputError."""
     case = casefile.muscle(comparison.scene)
     with new_folder(folder) as part:
         frames = _Frames(comparison)

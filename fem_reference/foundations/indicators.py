@@ -24,7 +24,7 @@ class Indicator:
 
 @dataclass(frozen=True)
 class Near:
-    """Nearness of the free surface to a bone. ``gap`` [mm]: the clearance, guaranteed for any error of the guessed surface motion.
+    """Nearness of the free surface to a bone. ``gap`` [mm]: the guaranteed clearance, for any error of the estimated motion.
     ``depth`` [mm]: the possible penetration of the surface, rms at the worst frame. ``frame``: the first with the least gap.
     """
 
@@ -68,7 +68,7 @@ class Estimates:
 
     def bend(self, force: float) -> float:
         """Displacement [mm], root mean square, of a Timoshenko beam with clamped ends under a ``force`` per volume [N/mm3]. Its
-        length, thickness and shear modulus are those of the muscle; its Young's modulus is three times its shear modulus. The mean
+        length, thickness and shear modulus are those of the muscle; its Young's modulus is three times its shear modulus. The rms
         is 0.6 of the displacement in the middle, halved because bending also stretches. A free body counts as moved by its length.
         """
         if not self.fixed:

@@ -227,7 +227,7 @@ def corner_fans(one: Ints, other: Ints, count: int) -> Ints:
 
 
 def connected_parts(first: Ints, second: Ints, count: int) -> Ints:
-    """The number (count,) of the connected part of each of ``count`` things; ``first`` (e,) are linked to ``second`` (e,)."""
+    """The number (count,) of the connected part of each of ``count`` nodes of a graph with edges ``first``, ``second`` (e,)."""
     links = coo_array((np.ones(len(first), bool), (first, second)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
 

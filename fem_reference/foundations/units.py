@@ -52,7 +52,7 @@ _EXPONENT = re.compile(r"(?<=[A-Za-z])(?=[23](?!\w))")
 
 @cache
 def _registry() -> Any:
-    import pint  # imported here, as it takes 0.4 s, which processes with common units only save
+    import pint  # imported here, as it takes 0.4 s, which is saved if only common units occur
 
     return pint.UnitRegistry(cache_folder=None)
 

@@ -160,7 +160,7 @@ def averaged(mesh: TetMesh, slopes: Floats) -> Floats:
 
 
 def _seeds(field: FibreField) -> Floats:
-    """Points (k, 3) where the field is 1/2, away from the skin: in each tet the cut's middle, and halfway to its corners."""
+    """Points (k, 3) where the field is 1/2, away from the skin: in each tet the middle of the cut, and halfway to its corners."""
     mesh = field.mesh
     ends = mesh.tets[:, EDGES]
     low, high = (field.values[ends[:, :, side]] - _HALFWAY for side in range(2))

@@ -98,7 +98,7 @@ def share_above(mesh: FieldMesh, level: float) -> Floats:
     """The fraction (m,) of each triangle's area with y above ``level``."""
     heights = np.sort(mesh.points[mesh.cells][:, :, 1] - level, axis=1)
     low, middle, high = heights.T
-    # The corner alone on its side of the level is cut off; its fraction of the area is the product of those of its two edges.
+    # The corner alone on its side of the level is cut off; its fraction of the area is the product of its edges' fractions.
     with np.errstate(divide="ignore", invalid="ignore"):
         top = np.where(high > 0, high**2 / ((high - low) * (high - middle)), 0.0)
         bottom = np.where(low < 0, low**2 / ((high - low) * (middle - low)), 0.0)

@@ -1,4 +1,4 @@
-"""Fibres spread by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves at the other.
+"""Fibres by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves evenly over the other.
 
 The flux per area of an attachment is constant, so lines that start evenly over one attachment end evenly over the other, and cover
 both areas. In contrast, the gradient of a potential that is constant on attachments is concentrated at their rims. In a sheet with
@@ -81,7 +81,7 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
 def streamlines(flux: Flow, count: int) -> Polylines:
     """``count`` lines of 40 points along a ``flux``, each for an equal area of both attachments; InputError if fewer can be traced.
 
-    Many lines start evenly over the area; the lines kept are the middles of groups that are compact at both ends (Lloyd 1982),
+    Many lines start evenly over the area; the selected lines are the middles of groups that are compact at both ends (Lloyd 1982),
     measured in units of the size of each attachment.
     """
     if count > MOST:

@@ -15,7 +15,7 @@ from fem_reference.geometry.distance import farthest_points
 _INSIDE, _SAMPLES = 20_000, 1500
 # The distance of samples on both sides of the surface, relative to the edge of a cube of the same volume.
 _BESIDE = 0.05
-# Rounds of the fit, each with the gradients of the level at the samples from the round before; maximum evaluations in each round.
+# Rounds of the fit, each with the gradients of the level at the samples from the previous round, and evaluations per round.
 _ROUNDS, _STEPS = 6, 8
 # The minimum and the maximum radius, relative to the edge of a cube of the same volume.
 _RADII = (0.02, 2.0)

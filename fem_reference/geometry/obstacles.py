@@ -14,7 +14,7 @@ _MIDDLE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """Points (n, 3) [mm] at which n paths meet and leave the ``obstacles`` (n,), and unit vectors (n, 3) along the paths there."""
+    """Contact of n paths with ``obstacles`` (n,): its first and last points ``met``, ``left`` (n, 3), unit tangents ``into``, ``out``."""
 
     obstacles: Ints
     met: Floats

@@ -13,7 +13,7 @@ from fem_reference.geometry.edges import Edges
 
 _ROUNDS = 4  # The number of rounds of collapses, flips and slides.
 _SHORT = 0.4  # Edges at a rim that are shorter than this fraction of a triangle's size are collapsed.
-_STRAIGHT = np.cos(np.radians(50))  # A rim that turns by more than this at a point has a corner there.
+_STRAIGHT = np.cos(np.radians(50))  # A rim that turns by more than 50 degrees at a point has a corner there.
 _SAME_SIDE = 0.5  # The minimum cosine between the normals of a triangle before and after a collapse.
 _TINY = np.finfo(float).tiny
 

@@ -185,7 +185,7 @@ def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: 
 
     A point counts if its nearest triangle is in the mask ``counts`` (m,). The rigid body is given by the ``distance`` (n,) [mm] of
     points (n, 3) to it, negative inside; ``gaps`` are the distances of the surface's points. If all points ``body`` (k, 3) [mm],
-    on all sides of the rigid body, are inside the surface, the whole body counts. The volume is 0 if no counted triangle enters
+    on all sides of the rigid body, are inside the surface, the entire body counts. The volume is 0 if no counted triangle enters
     the body and the middle of the body is outside the surface. It is NaN if the surface has grown beyond a cubic metre.
     """
     extent = np.ptp(surface.points, axis=0)

@@ -57,7 +57,7 @@ class Grid:
 
     ``coefficients`` (i, j, k) [mm] of the B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``. The distance
     is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and ``FAR`` outside the grid.
-    ``error`` [mm] is the largest difference found from the exact distance within one spacing of the surface, and
+    ``error`` [mm] is the largest sampled difference from the exact distance within one spacing of the surface, and
     ``mean_error`` [mm] the root mean square, not the mean, of the differences there. Farther away, the ridges between two close
     parts of the surface are rounded like edges, by a third of a spacing. The gradient is that of the spline: its length is 1 within
     a few per cent, except on edges.
@@ -86,7 +86,7 @@ class Grid:
         return deepest if deepest > self.spacing else np.inf
 
     def clearance(self, within: float) -> Clearance:
-        """A lower bound on the length of paths from points to a point whose distance is at most ``within`` [mm]."""
+        """A lower bound on the length of paths from given points to any point whose distance is at most ``within`` [mm]."""
         return of_spline(self.coefficients, np.asarray(self.origin), self.spacing, within)
 
     def sample(self, points: Floats) -> Sampled:

@@ -45,7 +45,7 @@ def _format(path: Path, want: str, known: Collection[str]) -> Format:
 
 
 def read_surface(path: Path, unit: float) -> Surface:
-    """The triangles of a file whose coordinates are in units of ``unit`` mm; ``place`` is the path.
+    """The triangles of a file whose coordinates are in units of ``unit`` mm; its ``place`` is the path.
 
     An STL file has no shared points: its surface has three points for each triangle. InputError if the file cannot be read
     completely or has polygons other than triangles.

@@ -12,7 +12,7 @@ Soup = tuple[Any, Any]
 
 
 def arrays(soup: Soup) -> tuple[Floats, Ints]:
-    """Points (n, 3) and triangles (m, 3) as arrays; ValueError or OverflowError if ``soup`` has no such shapes."""
+    """Points (n, 3) and triangles (m, 3) as arrays; ValueError or OverflowError if ``soup`` has other shapes."""
     points, corners = (np.asarray(values) for values in soup)
     if len(corners) == 0:
         raise ValueError("no triangles")

@@ -67,13 +67,13 @@ def parsed_xml(path: Path) -> ElementTree.Element:
 
 
 def check_no_entities(text: bytes) -> None:
-    """Raise ValueError if an XML text has a document type."""
+    """Raise ValueError if an XML text declares a document type or entities."""
     if any(one in text for one in _FORBIDDEN):
         raise ValueError("a document type, which no mesh file needs")
 
 
 def beside(path: Path, name: str) -> Path:
-    """The file ``name`` to which the file at ``path`` refers; ValueError if it is outside its folder, after following links."""
+    """The file ``name`` to which the file at ``path`` refers; ValueError if it is outside that file's folder."""
     found = path.parent / name
     if not found.resolve().is_relative_to(path.parent.resolve()):
         raise ValueError(f'a reference to "{name}", outside the folder of the file')
