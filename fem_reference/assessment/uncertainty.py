@@ -1,4 +1,4 @@
-"""Records of uncertainty: the band of a case's results for uncertain parameters, its sensitivities, and candidates in the band."""
+"""Records of uncertainty: the band of a case's results for unknown parameters, its sensitivities, and candidates in the band."""
 
 import math
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""The verb ``uncertainty``: the bands of results for uncertain parameters of a case."""
+"""The verb ``uncertainty``: the bands of results for unknown parameters of a case."""
 
 import argparse
 
@@ -11,7 +11,7 @@ from fem_reference.report.asked import Part
 from fem_reference.studies import uncertainty
 from fem_reference.studies.campaign import Workers
 
-HELP = "vary the uncertain parameters of a case within their ranges, and write the page of bands and sensitivities"
+HELP = "vary the unknown parameters of a case within their ranges, and write the page of bands and sensitivities"
 RUNS = 64
 
 
