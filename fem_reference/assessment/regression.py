@@ -164,7 +164,7 @@ def _judged(
 
 
 def _word(was: float, value: float, truth: float, bar: float, *, allowed: float) -> Word:
-    """The verdict on one frame; inconclusive if there is no number before and now, fail if a number is new."""
+    """The verdict on one frame; inconclusive without a number before and now, fail if a number is new."""
     if math.isnan(was) and math.isnan(value):
         return "inconclusive"
     if math.isnan(truth):

@@ -14,7 +14,7 @@ _MIDDLE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """Contacts of n paths with ``obstacles`` (n,): end points ``met`` and ``left`` (n, 3) [mm], and tangents ``into`` and ``out``."""
+    """Contacts of n paths with ``obstacles`` (n,): end points ``met``, ``left`` (n, 3) [mm], and tangents ``into``, ``out``."""
 
     obstacles: Ints
     met: Floats
