@@ -84,7 +84,7 @@ def count(several: Iterable[Beside], kind: Kind) -> tuple[int, int]:
 @dataclass(frozen=True, eq=False)
 class Row:
     """A quantity with its evidence: the number of verifying catalogue entries of each kind (``kinds``) and the ``orders`` that they
-    must show; the least and the greatest fact of its ``band``; and its comparisons with experiments (``beside``).
+    must show; the minimum and the maximum fact of its ``band``; and its comparisons with experiments (``beside``).
     """
 
     claim: Evidence

@@ -102,7 +102,7 @@ def find(experiment: str, quantity: str, condition: str) -> Fact:
 
 
 def model_band(quantity: str = "mean_surface_distance") -> tuple[Fact, ...]:
-    """The least and the greatest published difference between models and real muscles in a ``quantity``; empty without sources."""
+    """The minimum and the maximum published difference between models and real muscles in a ``quantity``; empty without sources."""
     return tuple(one for one in _own() if (one.experiment, one.quantity) == ("scale", quantity))
 
 

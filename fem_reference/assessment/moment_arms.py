@@ -17,7 +17,7 @@ DEGREE, STEP = 4, 2.0
 
 @dataclass(frozen=True, eq=False)
 class ArmRange:
-    """The least and greatest moment arm ``low``, ``high`` (a,) [mm] of a muscle's fibres at ``angles`` (a,) [deg]."""
+    """The minimum and maximum moment arm ``low``, ``high`` (a,) [mm] of a muscle's fibres at ``angles`` (a,) [deg]."""
 
     angles: Floats
     low: Floats

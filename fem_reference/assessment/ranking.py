@@ -34,7 +34,7 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Ranking:
-    """The ``places`` by one statistic, the least deviation first; ``title`` and ``unit`` of the statistic."""
+    """The candidates ranked by one statistic (``places``), the least deviation first; ``title`` and ``unit`` of the statistic."""
 
     title: str
     unit: str
