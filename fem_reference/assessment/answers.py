@@ -1,4 +1,4 @@
-"""Answers to the usual requests to a study: the best setting within an error, at a frame rate, and at the knee of the front."""
+"""Answers to the usual requests to studies: the best setting within an error limit, at a frame rate, at the knee of the front."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 from fem_reference.assessment.recommendation import Expected, chosen
 
-ERRORS = (1.0, 5.0)  # the requested errors, in the unit of the metric
+ERRORS = (1.0, 5.0)  # the requested limits of the error, in the unit of the metric
 RATE = 60.0  # the requested rate [frames a second]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer to a request with ``limits`` of error and time [s], empty for the knee: the ``best`` setting, None if no setting
-    meets it, and the best ``by_solver``. ``nearest``: if no setting meets the limits, the setting that misses them least.
+    """The answer to a request. ``limits``: upper limits of error and time [s], empty for the knee; ``best``: the best setting,
+    None if no setting meets the limits, and then ``nearest`` misses them least; ``by_solver``: the best setting of each solver.
     """
 
     limits: Mapping[str, float]
@@ -23,7 +23,7 @@ class Answer:
 
 
 def answers(known: Sequence[Expected]) -> tuple[Answer, ...]:
-    """The answers for each error, for the rate, and for the knee."""
+    """The answers for each requested error, for the requested rate, and for the knee."""
     requests = [*({"error": error} for error in ERRORS), {"time": 1 / RATE}]
     names = dict.fromkeys(one.point.solver for one in known)
     of = {name: [one for one in known if one.point.solver == name] for name in names}
@@ -39,8 +39,8 @@ def answers(known: Sequence[Expected]) -> tuple[Answer, ...]:
 
 
 def knee(known: Iterable[Expected]) -> Expected | None:
-    """The setting at the knee of the front of error against time: in logarithms, farthest below the line that joins its ends (Das
-    1999, Structural Optimization 18, 107-115). None for a front of fewer than three points, or if no point is below the line.
+    """The setting at the knee of the front of error against time: in logarithms, farthest below the line between the front's ends
+    (Das 1999, Structural Optimization 18, 107-115). None if the front has fewer than three points, or no point is below the line.
     """
     front = list[Expected]()
     for one in sorted(known, key=lambda one: (one.time, one.error)):

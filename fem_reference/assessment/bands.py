@@ -1,4 +1,4 @@
-"""Bands of results over the frames, from runs with varied parameters: by a surrogate if it is accurate, else by the runs."""
+"""Bands of results in each frame, from runs with varied parameters: from a surrogate if it is accurate, else from the runs."""
 
 import math
 from dataclasses import dataclass, replace
@@ -10,20 +10,20 @@ from fem_reference.assessment.gaussian_process import GaussianProcess
 from fem_reference.assessment.uncertainty import Band, Parameter
 from fem_reference.foundations.mesh import Floats
 
-# The greatest error of a surrogate that is used, as a fraction of the variance.
+# The maximum error of a surrogate that may be used, as a fraction of the variance.
 WORST = 0.05
-# The greatest allowed fraction of missing runs: if more were missing, all of them might lie beyond the 5th or 95th percentile.
+# The maximum fraction of missing runs: if more were missing, all of them might lie beyond the 5th or 95th percentile.
 MISSING = 0.05
-# The least number of runs for percentiles without a surrogate: the 5th and the 95th percentile must lie between values of runs.
+# The minimum number of runs for percentiles without a surrogate: the 5th and the 95th percentile must lie between values of runs.
 FEWEST = 20
 PERCENTILES = (0.05, 0.5, 0.95)
 _SAMPLES = 15  # the number of samples, as a power of 2
-_SHARE = 1e-6  # the fraction of the variance of a field that its principal components neglect
+_SHARE = 1e-6  # the fraction of a field's variance that its principal components neglect
 
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """The ``parameters``, the number of ``wanted`` runs, and the ``points`` (n, d), from -1 to 1, of the runs with results."""
+    """The ``parameters``, the number of runs ``wanted``, and the ``points`` (n, d), from -1 to 1, of the runs with results."""
 
     parameters: tuple[Parameter, ...]
     points: Floats
@@ -31,7 +31,7 @@ class Design:
 
     @property
     def refused(self) -> str:
-        """The reason why these runs are too few for a band, empty if they are not."""
+        """The reason why these runs are too few for a band, empty if they are enough."""
         made, variables = len(self.points), self.points.shape[1]
         if made < 2 * (variables + 1):
             return f"{made} runs have results, but {variables} parameters need at least {2 * (variables + 1)}"
@@ -42,7 +42,7 @@ class Design:
 
 
 def sampled(variables: int, runs: int, seed: int) -> Floats:
-    """Points (runs, d) from -1 to 1 of a Latin hypercube: one value of each variable in each of ``runs`` equal parts."""
+    """Points (runs, d) from -1 to 1 of a Latin hypercube: each variable has one value in each of ``runs`` equal intervals."""
     from scipy.stats import qmc  # imported here, as this takes half a second
 
     return np.asarray(2 * qmc.LatinHypercube(variables, rng=np.random.default_rng(seed)).random(runs) - 1)
@@ -62,8 +62,8 @@ def of_values(band: Band, design: Design, values: Floats) -> Band:
 
 
 def of_field(band: Band, design: Design, products: Floats) -> Band:
-    """The ``band`` of the weighted root mean square of a field, from the ``products`` (f, n, n) of the weighted fields of
-    each pair of runs in each frame. The surrogate describes the field by its principal components, as the root has a kink at 0.
+    """The ``band`` of the weighted root mean square of a field. ``products`` (f, n, n): in each frame, the inner products of the
+    weighted fields of each pair of runs. The surrogate describes the principal components of the field, as the root is not smooth.
     """
     if refused := design.refused or _not_numbers(products):
         return replace(band, refused=refused)
@@ -116,6 +116,6 @@ def _samples(design: Design) -> Floats:
 
 
 def _not_numbers(values: Floats) -> str:
-    """The reason to refuse values that are not all numbers, empty if they are."""
+    """The reason to refuse ``values`` that are not all finite, empty if all are."""
     bad = int((~np.isfinite(values)).sum())
     return f"{bad} values of runs are not numbers" if bad else ""

@@ -1,4 +1,4 @@
-"""The baseline of a candidate: a JSON file with its measures and positions at one time, and the allowed later changes."""
+"""The baseline of a candidate: a JSON file with its earlier measures and positions, and the allowed changes since then."""
 
 import json
 import logging
@@ -25,16 +25,16 @@ from fem_reference.scenes.muscle import MuscleCase
 log = logging.getLogger(__name__)
 
 FORMAT = 1
-# The number of decimal places stored of a statistic, by its unit, and of a coordinate [mm].
+# The number of stored decimal places: of a statistic, by its unit, and of a coordinate [mm].
 PLACES = {"mm": 4, "%": 4, "deg": 4, "mm3": 1, "N": 4, "N mm": 2, "kPa": 4}
 POSITION_PLACES = 2
-# The greatest distance [mm] between a position and its rounded value.
+# The maximum distance [mm] between a position and its rounded value.
 POSITION_ROUNDING = math.sqrt(3) * 0.5 * 10**-POSITION_PLACES
 # The number of sampled vertices, which take about 1.3 kB per frame. Motion of other vertices is visible only in the statistics.
 SAMPLED = 64
-# The tolerance of positions [mm] in a new baseline, far below visible differences. Machines that differ more need a larger value.
+# The tolerance of positions [mm] in a new baseline, far below visible differences. It must be larger if machines differ more.
 MOVED = 0.1
-# The tolerance of a statistic is at most this share of its greatest value over the frames.
+# The tolerance of a statistic is at most this fraction of its maximum over the frames.
 SHARE = 0.02
 # The allowed value is slightly above the measured value, to allow for rounding.
 _ROUNDING = 1 + 1e-6
@@ -55,7 +55,7 @@ class StoredStatistic(Record):
 
     @property
     def numbers(self) -> Floats:
-        """The values (f,), NaN if there is none."""
+        """The values (f,), NaN where there is none."""
         return np.array(self.values, float)
 
 
@@ -67,7 +67,7 @@ class Positions(Record):
     vertices: tuple[Annotated[int, Field(ge=0)], ...] = Field(min_length=1)
 
     def points(self, count: int, place: str) -> Floats:
-        """The values, NaN if there is none; InputError at ``place`` if a vertex number is not below ``count``."""
+        """The values (f, s, 3), NaN where there is none; InputError at ``place`` if a vertex number is not below ``count``."""
         if max(self.vertices) >= count:
             raise InputError(f"{place}: positions.vertices", max(self.vertices), f"0 to {count - 1}")
         return np.array([[(math.nan,) * 3 if one is None else one for one in frame] for frame in self.values])
@@ -112,7 +112,7 @@ def read(path: Path, case: MuscleCase, candidate: str) -> Baseline:
 
 
 def update(path: Path, current: CurrentMeasures) -> Baseline:
-    """Write the current values into ``path``. Every tolerance, and every ``within`` with a number, stays as in the file, so that
+    """Write the current values into ``path``. Every tolerance, and every ``within`` that is a number, stay as in the file, so that
     accuracy cannot be lost in small steps; statistics removed from the file are not added again.
     """
     check(path, current.scene, current.candidate.name)
@@ -190,12 +190,12 @@ def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> Store
 
 
 def limits(one: Measure, bars: Floats) -> tuple[float, float | None]:
-    """The tolerance for a change of a statistic and its greatest distance from the reference (None if not known) in a new baseline,
-    from the error bars (f,) of a deviation.
+    """The limits of a statistic in a new baseline, from the error bars (f,) of its deviation: the tolerance for changes, and the
+    maximum distance from the reference (None if not known).
 
-    Tolerance: the greatest bar, as smaller changes do not matter, but at most ``SHARE`` of the greatest value, as
-    stored values are exact even if the reference is uncertain. Distance: the greatest sum of a value and its bar; for a measure of
-    the run itself, which has no bar, the greatest value plus its tolerance.
+    Tolerance: the maximum bar, as smaller changes do not matter, but at most ``SHARE`` of the maximum value, as stored values are
+    exact even if the reference is uncertain. Distance: the maximum sum of a value and its bar; for a measure of the run itself,
+    which has no bar, the maximum value plus its tolerance.
     """
     least = 10.0 * 10.0 ** -PLACES[one.unit]
     values, bar, itself = np.abs(one.values), greatest(bars), metrics.of_itself(one.metric)

@@ -1,4 +1,4 @@
-"""The balance of the recorded forces of boundary conditions, bones and dead loads on a body, without the solver's residual."""
+"""The balance of forces on a body: recorded forces of boundary conditions and bones, and dead loads, without solver residuals."""
 
 import math
 from collections.abc import Iterator
@@ -15,9 +15,9 @@ from fem_reference.runs.store import Frame, Run
 
 
 def balance(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """The sum of the recorded forces on a ``body`` and of dead loads; without loads also the sum of moments about the origin. There
-    is no check if some forces are unknown: for a body that starts displaced or under tension; with a user's own effects, follower
-    loads, inertia or drag; with loads on cells other than straight tetrahedra; with regions that share nodes with a prescribed
+    """Checks that recorded forces on a ``body`` and dead loads sum to zero; without loads, also moments about the origin. There is
+    no check if some forces are unknown: for a body that starts displaced or under tension; with a user's own effects, follower
+    loads, inertia or drag; with loads on cells other than straight tetrahedra; if two regions share nodes and a prescribed
     component, as each region then records the force of these nodes.
     """
     residual, unknowns = getattr(solved.settings, "residual", math.nan), solved.outcome.cost.get("unknowns", math.nan)

@@ -19,17 +19,17 @@ from fem_reference.io.texts import plain
 
 COLUMNS = ("frame", "quantity", "value", "unit", "sd")
 CONFIDENCE = 0.95
-# Shares of a parameter's range: the step of finite differences, and the distance within which a value counts as at an end.
+# Fractions of a parameter's range: the step of finite differences, and the distance within which a value counts as at an end.
 _STEP, _AT = 1e-3, 1e-3
 # Two estimates whose errors are correlated by more than this are reported as a pair.
 _CORRELATED = 0.95
-# A combination of parameters is undetermined if its singular value is below this share of the greatest.
+# A combination of parameters is undetermined if its singular value is below this fraction of the largest.
 _NOTHING = 1e-6
 _WANT = f"a CSV file whose first row is {','.join(COLUMNS)}"
-# A function from several points (d,), in shares of the ranges, to the values (m,) of their runs for the data; None for a point
-# without a result.
+# A function from several points (d,), in fractions of the ranges, to the values (m,) that the run at each point gives for the
+# measured quantities; None for a point without a result.
 Forward = Callable[[Sequence[Floats]], Sequence[Floats | None]]
-# The greatest number of evaluations per parameter, not counting finite differences.
+# The maximum number of evaluations per parameter, not counting finite differences.
 _MOST = 50
 # The law fits the data if the residuals scatter by at most this many standard deviations of the data.
 FOLLOWED = 2.0
@@ -38,7 +38,7 @@ _ENDED = "a run that the fit needs has no result"
 
 @dataclass(frozen=True)
 class Measurement:
-    """A measurement: ``value`` and standard deviation ``sd``, in ``unit``, of a ``quantity``; ``place``: its place in the file."""
+    """A measurement: ``value`` and standard deviation ``sd``, in ``unit``, of a ``quantity``; ``place``: its file and row."""
 
     frame: int
     quantity: str
@@ -72,7 +72,7 @@ class Calibration:
     of the data: near 1 if law and data agree. ``singular``: singular values of the matrix of sensitivities, in standard deviations
     per range. ``pairs``: titles of parameters whose errors are correlated, with the correlation. ``runs``: the number of requested
     runs; ``failures``: the failed runs; ``ended``: the reason why the fit could not continue and has no intervals, else empty;
-    ``converged``: True if no step leads nearer to the measurements.
+    ``converged``: True if no further step reduces the residuals.
     """
 
     case: str
@@ -89,12 +89,12 @@ class Calibration:
 
     @property
     def is_followed(self) -> bool:
-        """True if the law fits the data to within their scatter."""
+        """True if the root mean square residual is at most ``FOLLOWED`` standard deviations of the data."""
         return self.scatter <= FOLLOWED
 
     @property
     def holds(self) -> bool:
-        """True if the fit has converged, the law fits the data, and all estimates are known within their ranges."""
+        """True if the fit has converged, the law fits the data, and each estimate is determined and inside its range."""
         return self.converged and self.is_followed and all(one.is_known and not one.at for one in self.estimates)
 
 
@@ -127,11 +127,11 @@ def _row(line: list[str], place: str, units: Callable[[str, str], str]) -> Measu
 
 
 class _NoAnswerError(Exception):
-    """Raised at a point without a result that the fit needs."""
+    """Raised if the fit needs a point that has no result."""
 
 
 class _Residuals:
-    """Differences between runs and measurements, in standard deviations, each point evaluated once."""
+    """Differences between runs and measurements, in standard deviations. Each point is evaluated once."""
 
     def __init__(self, forward: Forward, rows: Sequence[Measurement]) -> None:
         self.forward, self.known = forward, dict[bytes, Floats]()
@@ -147,7 +147,7 @@ class _Residuals:
         return [self.known[point.tobytes()] for point in points]
 
     def slopes(self, point: Floats, *_: Any) -> Floats:
-        """Finite differences (m, d) of the residuals, by steps towards the inside of the ranges."""
+        """Finite differences (m, d) of the residuals, with steps into the interior of the ranges."""
         steps = np.where(point < 0.5, _STEP, -_STEP)
         at, *moved = self.at([point, *(point + np.diag(steps))])
         if not np.isfinite([at, *moved]).all():
@@ -155,7 +155,7 @@ class _Residuals:
         return np.stack([(one - at) / step for one, step in zip(moved, steps, strict=True)], axis=1)
 
     def best(self) -> tuple[Floats, Floats] | None:
-        """The point with the least residuals so far, and these residuals; None before there are any."""
+        """The point with the least sum of squared residuals so far, and these residuals; None before there are any."""
         points = [(np.frombuffer(key), left) for key, left in self.known.items() if np.isfinite(left).all()]
         return min(points, key=lambda one: float(one[1] @ one[1])) if points else None
 
@@ -223,7 +223,7 @@ def _judged(point: Floats, left: Floats, slopes: Floats, parameters: Sequence[Pa
 
 
 def _estimate(parameter: Parameter, place: float, width: float) -> Estimate:
-    """The estimate at a ``place`` in its range; the place and the half-width of the interval are shares of the range."""
+    """The estimate at a ``place`` in its range; the place and the half-width of the interval are fractions of the range."""
     at = "low" if place < _AT else "high" if place > 1 - _AT else ""
     low, value, high = (parameter.at(one) for one in (place - width, place, place + width))
     return Estimate(parameter, value, low, high, at)
@@ -231,7 +231,7 @@ def _estimate(parameter: Parameter, place: float, width: float) -> Estimate:
 
 def _pairs(covariance: Floats, nothing: Floats, parameters: Sequence[Parameter]) -> tuple[tuple[str, str, float], ...]:
     """The titles of pairs of parameters whose errors are correlated, with the correlation: from the undetermined combinations
-    ``nothing`` if both are part of them, else from the ``covariance`` of the determined combinations.
+    ``nothing`` if both parameters occur in them, else from the ``covariance`` of the determined combinations.
     """
     lost, found = nothing.T @ nothing, list[tuple[str, str, float]]()
     for i, one in enumerate(parameters):

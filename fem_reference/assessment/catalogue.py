@@ -1,4 +1,4 @@
-"""Entries of the verification catalogue, problems with known answers, and their results."""
+"""Entries of the verification catalogue (problems with known answers) and their results."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -11,7 +11,7 @@ from fem_reference.problems.body import Body
 from fem_reference.runs.store import Run
 
 Kind = Literal["closed form", "published", "second solver", "property", "experiment"]
-# The allowed relative difference between the value of an experiment and the pinned value, due to root finding and processors.
+# The allowed relative difference between the value of an experiment and its pinned value, caused by root finding and processors.
 PINNED = 1e-5
 
 
@@ -19,12 +19,12 @@ class Lab(Protocol):
     """The solvers that measure entries."""
 
     def solve(self, body: Body, element: str, **settings: float) -> Run:
-        """The states of ``body`` by the reference, FEniCSx, with an element of ``body.ELEMENTS``; settings as in
+        """The states of ``body`` computed by the reference, FEniCSx, with an element of ``body.ELEMENTS``; settings as in
         ``BodySettings`` (first_step, smallest_step, newton_iterations, residual [N, mm3]).
         """
 
     def second(self, body: Body, element: str, **settings: float) -> Run:
-        """The states of the same problem by the second solver, scikit-fem."""
+        """The states of the same problem computed by the second solver, scikit-fem."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """Meshes, or steps in time, from coarse to fine.
+    """Meshes or time steps, from coarse to fine.
 
     ``counts``: numbers of cells or steps, each of ``size / count`` [mm] or [s]. The theoretical ``order`` of the error must be met
     to within 0.5; None: no order is measured. If ``extrapolated``, the value is extrapolated from the last two counts, for an
@@ -72,13 +72,13 @@ class Entry:
     ``refinement`` if there is one, and the values ``given`` by name. The number must equal the truth to ``within`` (in ``unit``, or
     relative to the truth if ``relative``), for the reason ``because``. ``source``: the source of the truth; ``kind``: its type.
     ``negative_control`` names a deliberate mistake; with the values ``wrong`` instead of ``given`` the entry must fail. ``slow``: a
-    measurement takes more than 4 s, or resembles another; ``slow_negative_control``: the same for the control. Only the verb verify
+    measurement takes more than 4 s, or resembles another; ``slow_negative_control``: the same for the control. Only ``verify``
     makes slow measurements.
 
     An entry of the kind "experiment" compares a model with a muscle: its verdict is "within" or "outside" the uncertainty of the
     experiment, and neither is a failure. It fails if the value no longer equals ``pinned``. ``facts``: the measured numbers from
-    which its truth is computed; ``is_order``: True for a stiffness ranking, whose value is 1 if reproduced, else 0, within
-    0.5; ``from_memory``: True if a part of its model or of its source is recalled, not checked against the publication.
+    which its truth is computed; ``is_order``: True for a stiffness ranking: the value is 1 if it is reproduced, else 0,
+    and the tolerance 0.5; ``from_memory``: True if a part of its model or source is recalled, not checked in the publication.
     """
 
     name: str
@@ -108,7 +108,7 @@ class Entry:
         return float(self.truth() if callable(self.truth) else self.truth)
 
     def find(self, lab: Lab, *, with_negative_control: bool = False) -> Finding:
-        """The finding; the negative control is measured on the finest count of a refinement only."""
+        """The finding; the negative control is measured only on the counts that the value needs."""
         given = {**self.given, **(self.wrong if with_negative_control else {})}
         if self.refinement is None:
             return _finding(self.measure(lab, **given))
@@ -192,7 +192,7 @@ class Verification:
 
     @property
     def judged(self) -> tuple[Result, ...]:
-        """The results that pass or fail by their tolerance: the results of all entries except experiments."""
+        """The results with a verdict of pass, fail or inconclusive: of all entries except experiments."""
         return tuple(one for one in self.results if one.entry.kind != "experiment")
 
     @property

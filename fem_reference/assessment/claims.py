@@ -1,4 +1,4 @@
-"""Error bars of references, compared with the differences from finer solutions, which the bars do not use."""
+"""Error bars of references, compared with the differences from finer solutions that the bars do not use."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from fem_reference.assessment.error_bars import ErrorBars, Of
 from fem_reference.metrics import Measure, described, find
 
-# The finer solution has a separate mesh, with tetrahedra of this share of the reference's size.
+# The finer solution has a separate mesh, whose tetrahedra have this fraction of the reference's size.
 FINER = 0.8
 # Statistics whose bars are compared with errors: metric and name.
 CLAIMED = tuple(described("claim"))
@@ -18,7 +18,7 @@ LEAST = 1e-6
 
 @dataclass(frozen=True)
 class Claim:
-    """The ``bar`` of a statistic at a ``frame`` of a ``case``, and its difference ``error`` from the finer solution."""
+    """The ``bar`` of a statistic at a ``frame`` of a ``case``, and the statistic's difference ``error`` from the finer solution."""
 
     case: str
     of: Of
@@ -31,7 +31,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Cover:
-    """A ``count`` of claims, the fraction ``share`` with an error within the bar, and the ``median`` ratio of bar to error."""
+    """The ``count`` of claims with an error, the fraction ``share`` with an error within the bar, the ``median`` of bar / error."""
 
     count: int
     share: float
@@ -39,7 +39,7 @@ class Cover:
 
     @classmethod
     def of(cls, claims: Iterable[Claim]) -> "Cover":
-        """The cover of ``claims``; NaN if there are none."""
+        """The cover of ``claims``; fraction and median are NaN if no claim has an error above rounding."""
         known = [claim for claim in claims if claim.error > LEAST]
         if not known:
             return cls(0, np.nan, np.nan)

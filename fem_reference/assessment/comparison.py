@@ -24,10 +24,10 @@ from fem_reference.scenes.case import Case, Expectation
 
 @dataclass(frozen=True)
 class Convergence:
-    """A case on successively halved meshes: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the two finest meshes.
+    """A case on meshes of successively halved size: ``cells`` and ``errors`` by mesh, and the ``order`` on the two finest meshes.
 
     ``against`` defines the error: the L2 distance to the exact solution, or the rms distance at the vertices from the finest
-    solution of order 2. ``order`` is NaN if the errors are rounding.
+    solution of order 2. ``order`` is NaN if the errors are only rounding.
     """
 
     element: str
@@ -42,8 +42,8 @@ class Comparison:
     """The runs of a case with their measures and verdicts. ``setup``: the muscle's ``Setup`` or the ``FieldProblem``.
     ``deviations``: by candidate name, its measures against the reference. ``changes``: by run name (also ``"reference"``), its
     measures against the rest state; for a field, which has no rest state, measures without a reference. ``extension_error`` [mm]:
-    by frame, the greatest error over the fibres of the extension on the reference's surface, None without an extension.
-    ``error_bars``: bars of the reference, None if not computed; ``ladders``: its convergence, if measured.
+    by frame, the maximum error of fibre lengths extended from the reference's surface, None without an extension.
+    ``error_bars``: bars of the reference, None if not computed; ``ladders``: its convergence on refined meshes, if measured.
     """
 
     scene: Case
@@ -75,7 +75,7 @@ class Comparison:
         return found
 
     def _repr_html_(self) -> str:
-        """A table for notebooks: the greatest deviation of each candidate, with its frame and its error bar."""
+        """A table for notebooks: the maximum deviation of each candidate, with its frame and its error bar."""
         rows = [
             (name, f"{one.metric}.{one.statistic}", f"{it.value:.4g} {it.unit}", known, it.frame)
             for name, measures in self.deviations.items()
@@ -123,9 +123,9 @@ class Comparison:
 def compare(
     case: Case, setup: CaseSetup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
-    """Measure and judge runs of a case against the ``reference`` as the truth; only the parts that a run carries are judged.
-    ``candidates`` have all frames of the case, with NaN for frames not reached; a measure that is uncertain within ``error_bars``
-    is inconclusive. InputError if the case expects a measure of a named run that this run lacks because it has no surface.
+    """Measure and judge runs of a case against the ``reference`` as the truth; only the data that a run carries are judged.
+    ``candidates`` have all frames of the case, with NaN for frames not reached. A verdict is inconclusive if the error bar extends
+    to both sides of the tolerance. InputError if the case expects a measure of a named run that has no surface to compute it from.
     """
     context, runs = metrics.context_of(setup, reference), (reference, *candidates)
     candidate, alone = metrics.names(case.standards("candidates")), metrics.names(case.standards("reference"))
@@ -161,7 +161,7 @@ class Alone(NamedTuple):
 
 
 def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
-    """The measures and verdicts of a ``run`` without a reference; none for a muscle, whose measures need a reference's context."""
+    """The measures and verdicts of a ``run`` without a reference; none for a muscle, whose measures need a reference."""
     if "reference" in case.standards("reference"):
         return Alone((), (), "not judged")
     measures = metrics.measure(run, run, metrics.context_of(setup, run), metrics.names(case.standards("reference")))

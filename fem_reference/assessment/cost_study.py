@@ -15,9 +15,9 @@ from fem_reference.foundations.records import parse
 from fem_reference.io import texts
 
 FORMAT = 1
-# The least and the greatest value that a feature of a case can have, in its unit.
+# The minimum and the maximum magnitude of a feature that is not 0, in its unit, and the maximum number of refinements.
 _LEAST, _MOST, _FINEST = 1e-9, 1e15, 20
-# The features by which recommendations compare cases; features used as divisors are above zero.
+# The features by which recommendations compare cases; features used as divisors are positive.
 FEATURES = ("size", "triangles", "motion", "contact", "bulk_to_shear", "fibres_to_shear", "tet_size", "refinements")
 _ABOVE_ZERO = ("size", "triangles", "tet_size")
 _WANT = "a study written by the verb study"
@@ -25,9 +25,9 @@ _WANT = "a study written by the verb study"
 
 @dataclass(frozen=True, eq=False)
 class CaseStudy:
-    """The points of a case. ``units`` of errors, and ``bars``, the error bars of the truth, by ``metric.statistic``; ``truth``: its
-    description; ``claims``: error bars of coarser references, with their errors; ``triangles``: their number on the surface;
-    ``travel`` [mm]: the greatest displacement of the truth; ``features`` of the case, as far as its scene states them
+    """The points of a case. ``units`` of errors, and ``bars``, the error bars of the truth, by ``metric.statistic``; ``truth``: a
+    description; ``claims``: error bars of coarser references, with their errors; ``triangles``: the number of surface triangles;
+    ``travel`` [mm]: the maximum displacement of the truth; ``features`` of the case, as far as its scene states them
     (:mod:`studies.features`); ``truth_key``: the folder of the truth's run in a store, "" if it is not known.
     """
 
@@ -133,7 +133,7 @@ def _check_features(study: CaseStudy, place: str) -> None:
 
 
 def _check_scene(scene: Any, place: str) -> None:
-    """Raise InputError if a point's changed keys of the scene are not a table, or state no size of tetrahedra."""
+    """Raise InputError if a point's changed keys of the scene are not a table, or define no valid size of tetrahedra."""
     if not isinstance(scene, dict):
         raise InputError(place, repr(scene), "a table of keys")
     for key in TETRAHEDRA if {*TETRAHEDRA} & {*scene} else ():

@@ -17,16 +17,16 @@ from fem_reference.assessment.moment_arms import ArmsBeside
 from fem_reference.foundations.records import Record, parse
 
 FILE = Path(__file__).with_suffix(".toml")
-_ROUNDED = 0.5  # the rounding of a share published without decimals, in per cent
+_ROUNDED = 0.5  # the rounding of a percentage published without decimals
 _WHOLE = 100.0  # all poses, in per cent
-_READ = ("publication", "abstract", "quotation", "memory")  # the texts in which numbers were read, the best first
-# "outside": the model differs from some measurement by more than its uncertainty, even if it agrees with other measurements.
+_READ = ("publication", "abstract", "quotation", "memory")  # kinds of text in which numbers were read, best first
+# "outside": the model differs from at least one measurement by more than its uncertainty, even if it agrees with others.
 Grade = Literal["validated", "indicative", "outside", "verified only", "not compared"]
 
 
 class Evidence(Record):
-    """The stated evidence of a quantity: groups of the catalogue that verify it, ``closed_forms`` and ``other_codes`` in words, the
-    numerical ``bar``, facts of its model ``band``, and its comparisons with ``experiments``, described in words in ``compared``.
+    """The stated evidence of a quantity: ``verified``, the groups of the catalogue that verify it; ``closed_forms`` and
+    ``other_codes``, in words; the numerical ``bar``; ``band``, facts on models; ``experiments``, described in ``compared``.
     """
 
     name: str
@@ -55,8 +55,8 @@ def claims() -> tuple[Evidence, ...]:
 class Beside:
     """A value of the model compared with a known value, both in ``unit``. ``truth``: the known value; ``within``: its uncertainty;
     ``n``: the number of specimens, None if unknown. ``validates``: True if agreement counts as validation. ``rests_on``: the text
-    in which the truth was read, and the unmeasured parts of truth or model. ``kind``: measurement, or model if another model is the
-    truth. ``is_order``: True for a stiffness ranking, whose value is 1 if reproduced, else 0, within 0.5.
+    in which the truth was read, and notes on a chosen tolerance and a recalled model. ``kind``: measurement, or model if another
+    model is the truth. ``is_order``: True for a stiffness ranking: the value is 1 if it is reproduced, else 0, the tolerance 0.5.
     """
 
     name: str
@@ -83,8 +83,8 @@ def count(several: Iterable[Beside], kind: Kind) -> tuple[int, int]:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A quantity with its evidence: the ``kinds`` of catalogue entries that verify it and the ``orders`` that they must show; the
-    least and the greatest fact of its ``band``; and its comparisons with experiments (``beside``).
+    """A quantity with its evidence: the number of verifying catalogue entries of each kind (``kinds``) and the ``orders`` that they
+    must show; the minimum and the maximum fact of its ``band``; and its comparisons with experiments (``beside``).
     """
 
     claim: Evidence
@@ -121,8 +121,8 @@ class Row:
 
     @property
     def grade(self) -> Grade:
-        """The grade: "outside" if it disagrees with one measurement, else "validated" if some measurement counts as validation,
-        else "indicative"; "verified only" without a known experiment, "not compared" without its results. Models do not count.
+        """The grade: "outside" if the model disagrees with any measurement, else "validated" if some comparison validates, else
+        "indicative"; "verified only" without a known experiment, "not compared" without its results. Models do not count.
         """
         met, of = self.measured
         if of == 0:
@@ -154,7 +154,7 @@ def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result]
 
 
 def of_result(found: Result) -> Beside:
-    """A measured entry of the kind experiment; it validates only if all its facts do and its model is not recalled."""
+    """A measured entry of the kind experiment; it validates only if all its facts do and its model is not recalled from memory."""
     entry = found.entry
     facts = entry.facts
     counted = not entry.from_memory and bool(facts) and all(one.validates for one in facts)
@@ -179,8 +179,8 @@ def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> 
 
 
 def of_arms(arms: ArmsBeside) -> Beside:
-    """Moment arms compared with a measured curve, which should be within their range in all poses, or with the range of another
-    model, of which they should cover the same share [%] as the moment arms of Modenese and Kohout 2020.
+    """Moment arms compared with a measured curve, which should lie within their range in all poses, or with the range of another
+    model, which they should cover to the same percentage as the moment arms of Modenese and Kohout 2020.
     """
     others_reach = reached(arms)
     inside = "poses with the measured moment arm inside the fibres' range"
@@ -194,22 +194,22 @@ def of_arms(arms: ArmsBeside) -> Beside:
         experiment=arms.experiment,
         rests_on="quotation, digitised; no ± known",
         remark=f"bias {arms.bias:.1f} mm, scatter {arms.scatter:.1f} mm over {arms.known} of {len(arms.found.angles)} poses with "
-        f"a published moment arm; {arms.setting}; on larger ones the mean changes by {arms.coarser:.1f} mm{others}",
+        f"a published moment arm; {arms.setting}; on larger tetrahedra the mean changes by {arms.coarser:.1f} mm{others}",
         kind=arms.kind,
     )
 
 
 def reached(arms: ArmsBeside) -> float:
-    """The share of poses inside, or the overlap [%], for the fibres of Modenese and Kohout 2020 on the same body."""
+    """The percentage of poses inside, or of overlap, for the fibres of Modenese and Kohout 2020 on the same body."""
     quantity = "share_inside" if arms.is_curve else "overlap"
     return experiments.find("modenese_kohout_2020", quantity, arms.muscle.replace("_", " ")).value
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """The best fit of a ``law`` to the quantities of cubes named in ``to``: its ``parameters`` by name with the published range,
-    None if none is known, and the ``values`` of all quantities by name; ``converged``: True if the fit ended at a minimum of the
-    sum of squares, False if its ``evaluations`` ran out first.
+    """The best fit of a ``law`` to the quantities of cubes named in ``to``: its ``parameters`` by name, each with its published
+    range (None if none is known), and the ``values`` of all quantities by name; ``converged``: True if the fit ended at a minimum
+    of the sum of squares, False if it ran out of ``evaluations`` first.
     """
 
     law: str

@@ -2,7 +2,7 @@
 
 There are two kinds of bars. The bar of a candidate's deviation from the reference is the deviation of the reference's runs from
 each other: by the triangle inequality, another reference changes the candidate's deviation by at most this amount. The bar of the
-reference's change from rest is the share of these deviations by which the changes of its runs differ. The bars of a body are
+reference's change from rest is the part of these deviations by which the changes of its runs differ. The bars of a body are
 differences of its states.
 """
 
@@ -32,18 +32,18 @@ SAFETY = 1.25
 # An additional factor for a single fibre: nothing averages out, and two sizes are weaker evidence than three (for two sizes Roache
 # takes 3). It was chosen so that bars cover the differences from finer solutions (docs/error_bars.md).
 LONE_FIBRE = 1.2
-# The ratio of the remaining first-order error to the change of the result when its source is halved. For the cells of a body this
-# is the least order away from rims of constraints, for any element (docs/error_bars.md).
+# The ratio of a first-order error to the change of the result when its source is halved. For the cells of a body, order 1 is the
+# lowest order away from rims of constraints, for any element (docs/error_bars.md).
 VARIATION = 2.0
 # The order of an error in the size of tetrahedra: in general, and at the worst point. Rims of attachments, where displacement grows
-# with the square root of the distance, give order 1, or 2 with a mesh graded towards them; all other places give 2 or more. The
-# general order is in between, as runs with three sizes also show (docs/error_bars.md).
+# with the square root of the distance, give order 1, or 2 with a mesh graded towards them; all other points give 2 or more. The
+# general order is in between, as runs with three sizes confirm (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
 # The relative change of a force or moment if the same springs are spread over facets instead of points of the surface:
-# 5.3 and 8.8 % of the force on the femur at 1 rad, of gluteus_medius and gluteus_maximus.
+# 5.3 and 8.8 % of the force on the femur at 1 rad, for gluteus_medius and gluteus_maximus.
 SPREAD = 0.09
 TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
-# Numbers as in a file, which has None for a number that is not finite.
+# Numbers as in a file, which stores None for a number that is not finite.
 _Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
 _Numbers = Annotated[
     Floats, PlainValidator(lambda values: np.array(TypeAdapter(list[_Number]).validate_python(values)))
@@ -55,10 +55,10 @@ _Differences = dict[Of, list[Floats]]
 @dataclass(frozen=True, eq=False)
 class ErrorBar:
     """The error bar of one statistic: its possible error due to the reference, ``values`` (f,) in ``unit``, NaN if unknown. ``of``:
-    the reference's change from rest, or a candidate's deviation from the reference. ``parts``: by source, its greatest contribution
-    over the frames.
+    the reference's change from rest, or a candidate's deviation from the reference. ``parts``: the maximum contribution of each
+    source over the frames.
 
-    ``model`` (f,): the change of the statistic by another model of spring attachments: by exact attachments if these were solved,
+    ``model`` (f,): the change of the statistic under another model of spring attachments: exact attachments if these were solved,
     and for a force or moment at least ``SPREAD`` of its value; NaN where exact attachments could not be solved, None if there are
     no springs or no other model was solved. This is not an error of the present model, so it is not part of ``values``.
     """
@@ -73,7 +73,7 @@ class ErrorBar:
 
     @property
     def widest(self) -> int:
-        """The index of the frame with the greatest bar; an unknown bar counts as the greatest."""
+        """The index of the frame with the widest bar; an unknown bar counts as the widest."""
         return int(np.argmax(np.where(np.isnan(self.values), np.inf, self.values)))
 
 
@@ -105,7 +105,7 @@ class Pair:
     """Runs of the reference over the same frames: ``fine`` is the reference itself, ``coarse`` has larger tetrahedra, each of
     ``varied`` is ``coarse`` with one source of error halved, by name, and ``exact`` has exact attachments instead of springs.
 
-    ``sizes`` [mm]: the sizes of the tetrahedra; ``safety``: the ratio of bars to the expected error; ``springs``: True if some
+    ``sizes`` [mm]: the sizes of the tetrahedra; ``safety``: the ratio of bars to the expected error; ``springs``: True if any
     attachment is by springs.
     """
 
@@ -118,7 +118,7 @@ class Pair:
     springs: bool = False
 
     def share(self, metric: str, statistic: str) -> float:
-        """The ratio of the fine run's error to the difference of the two, with the safety factor of a grid convergence index."""
+        """The ratio of the fine run's error to the difference of both runs, with the safety factor of a grid convergence index."""
         stated = described()[metric, statistic]
         order = ORDER_OF_WORST if stated.local else ORDER
         safety = self.safety * (LONE_FIBRE if stated.lone else 1.0)
@@ -163,8 +163,8 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
 
 
 def _model(one: Measure, exact: Floats | None, own: Floats | None) -> Floats | None:
-    """The change (f,) of the statistic ``one`` by another model of springs: by ``exact`` attachments, if known, and for the
-    reference's ``own`` force or moment also by springs that are spread in another way.
+    """The change (f,) of the statistic ``one`` under another model of springs: under ``exact`` attachments, if solved, and for the
+    reference's ``own`` force or moment also with springs that are distributed differently.
     """
     forces = one.metric == "joint_moment" and one.statistic != "arm"
     spread = SPREAD * np.abs(own) if forces and own is not None else None
@@ -243,7 +243,7 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
 
 @dataclass(frozen=True, eq=False)
 class BodyBars:
-    """Error bars of a body at ``frames`` (f,): distances from its states on ever finer cells of the same shape. ``points`` (f, n)
+    """Error bars of a body at ``frames`` (f,): distances from its states in the limit of fine cells. ``points`` (f, n)
     [mm], ``energy`` (f,) [N mm], and by name of each constraint or bone the vectors ``forces`` (f,) [N] and ``moments`` (f,)
     [N mm]; NaN if unknown. ``displacement`` (f,): the bar of the displacement divided by the displacement, both rms over the nodes.
     ``sharper``: the more accurate solution, in words.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class CurveError:
-    """A ``technique`` through ``known`` points of each fibre: distances [mm] of other points from its curve, rms and greatest."""
+    """A ``technique`` through ``known`` points of each fibre: distances [mm] of other points from its curve, rms and maximum."""
 
     case: str
     technique: str
@@ -16,8 +16,8 @@ class CurveError:
 
 @dataclass(frozen=True)
 class HeightError:
-    """A fit of the heights of an attached area over its plane, at every second vertex, by Gaussians with a number of ``centres`` of
-    a ``choice``: the error [mm] at the other vertices, and the condition number of the matrix.
+    """A fit by Gaussians to the heights, above its plane, of every second vertex of an attached area: the number of ``centres``,
+    the ``choice`` of their positions, the rms error [mm] at the other vertices, and the ``condition`` number of the matrix.
     """
 
     case: str
@@ -30,7 +30,7 @@ class HeightError:
 
 @dataclass(frozen=True)
 class FitError:
-    """A muscle's surface of ``vertices`` fitted by ``gaussians``: rms and greatest distance of vertices [mm], ratio of volumes."""
+    """A muscle's surface of ``vertices`` fitted by ``gaussians``: rms and maximum distance of vertices [mm], ratio of volumes."""
 
     case: str
     vertices: int
@@ -48,7 +48,7 @@ class FitError:
 @dataclass(frozen=True)
 class DecompositionError:
     """Fibres of a ``source`` compared with the fibres of ``against``: the angle between them [degrees], median and 95th percentile,
-    the ratio of their mean lengths, the share of points ``outside`` the muscle, and the pairs of fibres that cross.
+    the ratio of their mean lengths, the fraction of points ``outside`` the muscle, and the number of pairs of fibres that cross.
     """
 
     case: str
@@ -64,7 +64,7 @@ class DecompositionError:
 @dataclass(frozen=True)
 class RodError:
     """A muscle as ``rods`` of one ``radius`` [mm] along its fibres, with the muscle's volume in total, as in ``viper`` at rest: the
-    share of the muscle that is ``filled``, and the shares of the rods that are ``outside`` or ``overlap``.
+    fraction of the muscle that is ``filled``, and the fractions of the rods that are ``outside`` it or ``overlap``.
     """
 
     case: str
@@ -77,8 +77,8 @@ class RodError:
 
 @dataclass(frozen=True)
 class AnswerChange:
-    """The change of the reference's result with fibres of a ``source`` instead of ``against``: by ``metric.statistic`` the greatest
-    change over the frames, empty if a solution is missing (``status``); ``bars``: the error bars of the result.
+    """The change of the reference's result with fibres of a ``source`` instead of ``against``: the maximum change over the frames
+    by ``metric.statistic``, empty if a solution is missing (``status``); ``bars``: the error bars of the result.
     """
 
     case: str

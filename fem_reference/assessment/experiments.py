@@ -22,7 +22,7 @@ _Text = Annotated[str, StringConstraints(min_length=1)]
 
 
 class Fact(Record):
-    """A measured number: ``value`` in ``unit``, its standard deviation ``sd`` over ``n`` specimens if known, the way in which it
+    """A measured number: ``value`` in ``unit``, its standard deviation ``sd`` over ``n`` specimens if known, the method by which it
     was taken from the publication (``how``), and the kind of text in which it was read (``read_in``).
     """
 
@@ -47,7 +47,7 @@ class Fact(Record):
 
 class Experiment(Record):
     """An experiment of a ``kind`` (measurement, model, or bands from several publications), with its ``specimen``, its ``boundary``
-    conditions, and the parts of it that a scene repeats (``repeated``) and does not repeat (``not_repeated``). ``file``: a full
+    conditions, and the parts of it that a scene repeats (``repeated``) or does not repeat (``not_repeated``). ``file``: a full
     curve, in the folder that the environment variable ``FEM_REFERENCE_DATA`` names.
     """
 
@@ -62,7 +62,7 @@ class Experiment(Record):
 
 
 def facts(folder: Path = FOLDER) -> Iterator[Fact]:
-    """Every measured number of a ``folder``; InputError, with the line, if a number is incomplete."""
+    """Every measured number of a ``folder``; InputError, with the line, if a row is incomplete or invalid."""
     with (folder / NAME).open(encoding="utf-8", newline="") as file:
         for line, row in enumerate(csv.DictReader(file, strict=True), 2):
             yield _fact(row, f"{NAME}:{line}")
@@ -102,18 +102,18 @@ def find(experiment: str, quantity: str, condition: str) -> Fact:
 
 
 def model_band(quantity: str = "mean_surface_distance") -> tuple[Fact, ...]:
-    """The least and the greatest published difference between models and real muscles in a ``quantity``; empty without sources."""
+    """The minimum and the maximum published difference between models and real muscles in a ``quantity``; empty without sources."""
     return tuple(one for one in _own() if (one.experiment, one.quantity) == ("scale", quantity))
 
 
 def ratio(upper: Fact, lower: Fact) -> tuple[float, float]:
-    """The ratio of two facts, and its standard deviation, assuming that they are independent; NaN if that of either is unknown."""
+    """The ratio of two independent facts, and its standard deviation, NaN if either fact has none."""
     value = upper.value / lower.value
     parts = [math.nan if one.sd is None else one.sd / one.value for one in (upper, lower)]
     return value, abs(value) * math.hypot(*parts)
 
 
 def least_specimens(several: Iterable[Fact]) -> int | None:
-    """The least number of specimens of ``several`` facts; None if one is unknown."""
+    """The least number of specimens of ``several`` facts; None if any is unknown or there are no facts."""
     counts = [one.n for one in several]
     return None if None in counts or not counts else min(one for one in counts if one is not None)

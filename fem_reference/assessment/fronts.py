@@ -1,6 +1,6 @@
 """Fronts of accuracy against cost: points of measured settings that no other point beats, and the price of half the error.
 
-Settings are compared at the same error or the same cost, never at the same settings (work-precision diagrams: Hairer, Norsett,
+Solvers are compared at the same error or the same cost, never at the same settings (work-precision diagrams: Hairer, Norsett,
 Wanner 1993, Solving Ordinary Differential Equations I, II.10).
 """
 
@@ -25,7 +25,7 @@ COSTS: dict[str, tuple[str, str]] = {
     "projections": ("projections of a constraint", ""),
     "peak_memory_mb": ("peak memory", "MB"),
 }
-# The name of the cost that is the share of the machine used by other processes during a run, and the share that slows a run.
+# The name of the cost that states the fraction of the machine used by other processes, and the fraction that slows a run.
 LOAD, LOADED = "load_by_others", 0.1
 # The keys of a scene that define its tetrahedra.
 TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
@@ -38,8 +38,8 @@ _LEAST_POINTS, _LEAST_SPAN = 2, 1.3
 @dataclass(frozen=True)
 class Point:
     """A ``solver`` with settings, run on a ``case``: the varied key (``knob``, "" for the settings of the case or the default) and
-    its ``value`` as text; ``choice``: everything needed to repeat it; its outcome. ``errors``: by ``metric.statistic``, the
-    greatest deviation from the truth over the frames; ``costs``: the known costs of ``COSTS`` by name, and seconds by phase.
+    its ``value`` as text; ``choice``: everything needed to repeat it; ``status``, ``message``: its outcome. ``errors``: maximum
+    deviations from the truth by ``metric.statistic``; ``costs``: the known costs of ``COSTS`` by name, and seconds by phase.
     """
 
     case: str
@@ -75,13 +75,13 @@ class Point:
         return self.costs.get(LOAD, math.nan)
 
     def at(self, error: str, cost: str) -> tuple[float, float] | None:
-        """The error and the cost of the point, None if either is unknown or not above zero."""
+        """The error and the cost of a converged point; None if either is unknown or not positive, or the point did not converge."""
         pair = self.errors.get(error, math.nan), self.costs.get(cost, math.nan)
         return pair if self.status == "converged" and min(pair) > 0 and all(map(math.isfinite, pair)) else None
 
 
 def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
-    """The points that no other point beats in both error and cost, the cheapest first."""
+    """The points that no cheaper point beats in error, the cheapest first."""
     known = [(pair[1], pair[0], i, point) for i, point in enumerate(points) if (pair := point.at(error, cost))]
     found, best = list[Point](), math.inf
     for _, value, _, point in sorted(known):
@@ -93,8 +93,8 @@ def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
 
 @dataclass(frozen=True)
 class Price:
-    """The price of accuracy of a ``solver``: ``factor``, the ratio of the cost at half an error to the cost at the error, on its
-    front, NaN if more cost does not reduce the error; the ``best`` and ``worst`` errors of the front, which has ``count`` points;
+    """The price of accuracy of a ``solver``: ``factor``, by which the cost on its front grows if the error is
+    halved, NaN if more cost does not reduce the error; the ``best`` and ``worst`` errors of the front, which has ``count`` points;
     ``nearest``: the point with the best error.
     """
 
@@ -140,7 +140,7 @@ class Match:
 
 
 def match(points: Iterable[Point], error: str, cost: str, *, same: str, at: float) -> Match:
-    """The best point of each solver whose error or cost ``same`` is at most ``at``; on equality, the point with less of it."""
+    """The best point of each solver whose error or cost ``same`` is at most ``at``; ties go to the least ``same``."""
     i = 0 if same == error else 1
     known = [(pair, point) for point in points if (pair := point.at(error, cost)) and pair[i] <= at]
     best = dict[str, Point]()
@@ -150,7 +150,7 @@ def match(points: Iterable[Point], error: str, cost: str, *, same: str, at: floa
 
 
 def levels(points: Iterable[Point], error: str, cost: str, *, same: str, count: int = 5) -> tuple[float, ...]:
-    """Errors or costs at which points can be compared, over their range: 1, 2 or 5 times a power of ten."""
+    """Some errors or costs ``same`` at which points can be compared, over their range: 1, 2 or 5 times a power of ten."""
     values = [pair[0 if same == error else 1] for point in points if (pair := point.at(error, cost))]
     if not values:
         return ()

@@ -1,4 +1,4 @@
-"""A Gaussian process: a function of a few uniform variables from its values in runs, and its sensitivities.
+"""A Gaussian process: an approximation to a function of a few uniform variables from its values in runs, and its sensitivities.
 
 The process has a linear trend and a squared exponential covariance with a length scale for each variable. The lengths and the noise
 maximise the profile likelihood (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sections 2.7 and 5.4.1), with
@@ -17,9 +17,9 @@ from scipy.spatial.distance import cdist
 from fem_reference.foundations.mesh import Floats
 
 _GROUPS = 10  # the number of groups of runs, each left out in turn
-_LENGTHS, _NOISE = (0.2, 40.0), (1e-10, 0.1)  # limits: for variables from -1 to 1; in variances about the trend
+_LENGTHS, _NOISE = (0.2, 40.0), (1e-10, 0.1)  # limits; the noise is in variances about the trend
 _START = 1.0, 1e-4
-_LEAST = 1e-24  # the least variance about the trend, as a share of the squares of the outputs: the trend may explain them all
+_LEAST = 1e-24  # the least variance about the trend, as a fraction of the outputs' squares: the trend may reproduce them exactly
 _SAMPLES = 13  # the number of samples, as a power of 2
 
 
@@ -28,7 +28,7 @@ class GaussianProcess:
     """The process through outputs (n, q) at ``points`` (n, d) from -1 to 1: logarithms of the length of each variable and of the
     noise (``logs`` (d + 1,)), the ``trend`` (1 + d, q) and the ``weights`` (n, q) of the points.
 
-    ``error``: the mean square error at runs left out of the fit, including that of lengths, as a fraction of the outputs' variance.
+    ``error``: the mean square error at runs left out of all fits, also of lengths and noise, relative to the outputs' variance.
     """
 
     points: Floats
@@ -53,7 +53,7 @@ class GaussianProcess:
 
     @cached_property
     def _shares(self) -> Floats:
-        """The shares (2, d), by samples of two independent points in which one variable at a time is exchanged."""
+        """Both fractions (2, d), from samples of pairs of independent points between which one variable at a time is exchanged."""
         from scipy.stats import qmc  # importing takes half a second, and few processes need it
 
         variables = self.points.shape[1]
@@ -90,7 +90,7 @@ def fit(points: Floats, outputs: Floats) -> GaussianProcess | None:
 
 
 def _fitted(points: Floats, outputs: Floats, start: Floats) -> GaussianProcess:
-    """The process of greatest likelihood near the logarithms ``start`` (d + 1,)."""
+    """The process of maximum likelihood near the logarithms ``start`` (d + 1,)."""
     bounds = [tuple(np.log(_LENGTHS))] * points.shape[1] + [tuple(np.log(_NOISE))]
     found = minimize(_unlikely, start, (points, outputs), jac=True, method="L-BFGS-B", bounds=bounds).x
     return GaussianProcess(points, found, *_solved(points, outputs, found)[:2])

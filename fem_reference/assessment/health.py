@@ -1,4 +1,4 @@
-"""Quantities that show whether a run is stable, by frame and with the worst point: 0 for a healthy run."""
+"""Quantities that show whether a run is stable, by frame and with the worst point."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -24,9 +24,9 @@ class Followed:
     """A run whose health is measured. ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame
     ``numbers``; for a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3). ``bones``: bones with which ``free``
     (n,) vertices may be in contact. ``truth`` (f, n, 3): the same vertices in the reference, if it has them. ``integrated`` (f,),
-    of several bodies (f, b): V/V0 from the solver. If known, ``negative_modes`` (f,), ``material_modes`` (f,), the negative modes
-    that the material certainly has, and ``least_determinant`` (f,), the least det F. For a scalar field its ``values`` (f, N) and
-    the ``range`` of its boundary values. ``spans``: the parts of each of several bodies.
+    for several bodies (f, b): V/V0 from the solver. If known: numbers of ``negative_modes`` (f,) and ``material_modes`` (f,), those
+    certainly due to the material, and ``least_determinant`` (f,), the least det F. For a scalar field its ``values`` (f, N) and
+    the ``range`` of its boundary values. ``spans``: the slices of arrays that belong to each of several bodies.
     """
 
     numbers: tuple[int, ...]
@@ -51,7 +51,7 @@ class Followed:
         return tuple(self._of(i, span) for i, span in enumerate(self.spans)) or (self,)
 
     def _of(self, i: int, span: Span) -> "Followed":
-        """The surface, the tetrahedra and the volume of body number ``i``, at a ``span``."""
+        """The surface, the tetrahedra and the volume of body number ``i``, from its ``span``."""
         integrated = None if self.integrated is None else self.integrated[:, i]
         triangles, mesh, nodes = self.surface.triangles - span.vertices.start, self.mesh, self.nodes
         own = ((triangles >= 0) & (triangles < span.vertices.stop - span.vertices.start)).all(axis=1)
@@ -71,12 +71,12 @@ class Followed:
 
 _LOOKS = 33  # the number of positions of a vertex that are sampled on its path from a frame to the next
 
-# Values (f,), and words (f,) and points (f, 3) of the worst point, the last two None if there is no particular place.
+# Values (f,), and words (f,) and points (f, 3) of the worst point; the last two are None if there is no worst point.
 Found = tuple[Floats, list[str] | None, Floats | None]
 
 
 def volume(run: Followed) -> Found:
-    """Change of the enclosed volume, in per cent of the volume at rest; for several bodies the greatest change."""
+    """Change of the enclosed volume, in per cent of the volume at rest; for several bodies the maximum."""
     if run.spans:
         changes = np.array([volume(one)[0] for one in run.bodies])
         return np.max(changes, axis=0), None, None
@@ -88,8 +88,8 @@ def volume(run: Followed) -> Found:
 
 
 def inside_out(run: Followed) -> Found:
-    """Inverted fraction: of the tetrahedra, if any, in per cent of the volume at rest, else of the surface in per cent of its area.
-    For curved elements, whose corners do not show inversion, the share is 0 or 100 by the least det F.
+    """Inverted fraction: of the tetrahedra, if any, in per cent of the volume at rest, else of the surface in per cent of its
+    triangles. For curved elements, whose corners do not show inversion, it is 0 or 100 according to the minimum of det F.
     """
     if run.least_determinant is not None:
         words = [f"det F is at least {value:.2g}" for value in run.least_determinant]
@@ -112,23 +112,23 @@ def inside_out(run: Followed) -> Found:
 
 
 def from_rest(run: Followed) -> Found:
-    """Greatest distance of a vertex from its rest position, in per cent of the body's size."""
+    """Maximum distance of a vertex from its rest position, in per cent of the body's size."""
     return _off(run, np.broadcast_to(run.surface.points, run.positions.shape))
 
 
 def from_first(run: Followed) -> Found:
-    """Greatest distance of a vertex from its position in a rigid motion with the first bone, in per cent of the body's size."""
+    """Maximum distance of a vertex from its position in a rigid motion with the first bone, in per cent of the body's size."""
     poses = [run.bones[0].pose(number) for number in run.numbers]
     return _off(run, np.array([apply(pose, run.surface.points) for pose in poses]))
 
 
 def from_reference(run: Followed) -> Found:
-    """Greatest distance of a vertex from the vertex in the reference, in per cent of the body's size; NaN without a reference."""
+    """Maximum distance of a vertex from its place in the reference, in per cent of the body's size; NaN without a reference."""
     return _off(run, np.full(run.positions.shape, np.nan) if run.truth is None else run.truth)
 
 
 def stretch(run: Followed) -> Found:
-    """The greatest stretch of an edge of the surface, relative to rest."""
+    """Maximum stretch of an edge of the surface, relative to rest."""
     edges = np.unique(np.sort(run.surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     states = np.concatenate([run.surface.points[None], run.positions])
     rest, *lengths = np.linalg.norm(states[:, edges[:, 1]] - states[:, edges[:, 0]], axis=2)
@@ -139,7 +139,7 @@ def stretch(run: Followed) -> Found:
 
 
 def penetration(run: Followed) -> Found:
-    """Greatest depth of a free vertex inside a bone, in per cent of the body's size."""
+    """Maximum depth of a free vertex inside a bone, in per cent of the body's size."""
     depths = np.zeros(run.positions.shape[:2])
     for bone in run.bones:
         for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
@@ -148,7 +148,7 @@ def penetration(run: Followed) -> Found:
 
 
 def passed(run: Followed) -> Found:
-    """Greatest depth of a free vertex inside a bone on its straight path, relative to the bone, from the previous frame, in per
+    """Maximum depth of a free vertex inside a bone on the vertex's straight path, relative to the bone, from the last frame, in per
     cent of the body's size. It detects a bone that crosses the body and is outside in both frames.
     """
     depths = np.zeros(run.positions.shape[:2])
@@ -165,12 +165,12 @@ def passed(run: Followed) -> Found:
 
 
 def _deepest(run: Followed, depths: Floats) -> Found:
-    """The greatest of the ``depths`` (f, n) [mm] of free vertices, in per cent of the body's size."""
+    """The maximum of the ``depths`` (f, n) [mm] of free vertices, in per cent of the body's size."""
     return _worst(run, 100 * np.where(True if run.free is None else run.free, depths, 0.0) / run.size)
 
 
 def pierced(run: Followed) -> Found:
-    """Greatest depth of a vertex of a bone in the body, in per cent of the body's size, as thin bones fit between its vertices."""
+    """Maximum depth of a bone's vertex in the body, in per cent of the body's size: thin bones fit between its vertices."""
     values, places = np.zeros(len(run.numbers)), np.tile(run.surface.points[0], (len(run.numbers), 1))
     for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
         body = run.surface.moved_to(points)
@@ -184,7 +184,7 @@ def pierced(run: Followed) -> Found:
 
 
 def crossed(run: Followed) -> Found:
-    """Greatest depth to which bodies, or parts of one body, penetrate each other, in per cent of the size: 0 if an exact test finds
+    """Maximum depth to which bodies, or parts of one body, penetrate each other, in per cent of the size: 0 if an exact test finds
     no intersecting triangles of their surfaces; for one body, triangles that intersect at rest are ignored.
     """
     values, places = np.full(len(run.numbers), np.nan), np.tile(run.surface.points[0], (len(run.numbers), 1))
@@ -198,7 +198,7 @@ def crossed(run: Followed) -> Found:
 
 
 def overshoot(run: Followed) -> Found:
-    """Greatest distance of a scalar field from the range of its boundary values, in per cent of that range."""
+    """Maximum distance of a scalar field from the range of its boundary values, in per cent of that range."""
     assert run.values is not None  # only scalar fields have this quantity
     low, high = run.range
     beyond = np.maximum(run.values - high, low - run.values).max(axis=1)
@@ -211,7 +211,7 @@ def _off(run: Followed, wanted: Floats) -> Found:
 
 
 def _worst(run: Followed, each: Floats) -> Found:
-    """The greatest of ``each`` (f, n) vertex in each frame."""
+    """The maximum over the vertices in each frame of the values ``each`` (f, n)."""
     worst = np.argmax(np.where(np.isnan(each), np.inf, each), axis=1)
     frames = np.arange(len(each))
     return each[frames, worst], [f"at vertex {vertex}" for vertex in worst], run.positions[frames, worst]

@@ -1,4 +1,4 @@
-"""Verdicts on measures by truth and tolerance, and the doubts about a reference that make a pass doubtful."""
+"""Verdicts on measures from truth and tolerance, and the doubts about a reference that make a pass doubtful."""
 
 import math
 from collections.abc import Collection, Iterable
@@ -16,7 +16,7 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
 
 Word = Literal["pass", "doubtful pass", "fail", "inconclusive", "not judged"]
-# Verdicts that count as met.
+# Verdicts on expectations that are met.
 MET: tuple[Word, ...] = ("pass", "doubtful pass")
 _KINDS = {
     "mm": ("a length", 1.0),
@@ -30,7 +30,7 @@ _KINDS = {
     "kPa": ("a pressure", 1000.0),
     "1": ("a number", 1.0),
 }
-_LOW = 0.1  # det F below which a state is hardly valid
+_LOW = 0.1  # det F below which a state is doubtful
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def overall(words: Iterable[Word]) -> Word:
 
 
 def doubts(reference: Run) -> list[str]:
-    """Reasons to doubt a reference, in words: missing frames, instability, near inversion, laws out of range, lost energy."""
+    """Reasons to doubt a reference, in words: missing frames, instability, near inversion, laws out of range, energy gaps."""
     said = [] if reference.outcome.status == "converged" else [str(reference.outcome.status)]
     modes = reference.scalars.get("negative_modes")
     unstable = 0 if modes is None else int((np.nan_to_num(modes) > 0).sum())
@@ -89,7 +89,7 @@ def doubts(reference: Run) -> list[str]:
         said.append(f"det F falls to {float(min(smallest)):#.3g}")
     outside = np.nan_to_num(reference.scalars.get("outside_law", np.zeros(0))) > 0
     if outside.any():
-        where = f"in {int(outside.sum())} of {len(outside)} frames, first in {reference.numbers[int(outside.argmax())]}"
+        where = f"in {int(outside.sum())} of {len(outside)} frames, first in frame {reference.numbers[int(outside.argmax())]}"
         said.append(f"cells are outside the intended range of a law {where}: see Provenance")
     gaps = np.nan_to_num(reference.scalars.get("energy_gap", np.zeros(0)))
     if (np.abs(gaps) > ENERGY_GAP).any():
@@ -141,7 +141,7 @@ def resolved(expectation: Expectation) -> Expectation:
 
 
 def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...]) -> Verdict:
-    """The verdict on a checked ``expectation`` by the ``measures`` of its run over frame ``numbers``."""
+    """The verdict on a checked ``expectation`` from the ``measures`` of its run over frame ``numbers``."""
     name = (expectation.metric, expectation.statistic)
     found = next(measure for measure in measures if (measure.metric, measure.statistic) == name)
     bars = found.error_bars

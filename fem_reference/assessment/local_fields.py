@@ -41,7 +41,7 @@ def to_bones(run: Run, context: MeasurementContext) -> Floats | None:
 
 
 def stretch_along(lines: Polylines, positions: Floats) -> Floats:
-    """Stretch (f, m) at the points of ``lines`` moved to ``positions`` (f, m, 3) [mm], of the pieces that meet at each point."""
+    """Stretch (f, m) at the points of ``lines`` moved to ``positions`` (f, m, 3) [mm], of both adjacent pieces taken together."""
     count = len(lines.points)
     joined = np.ones(count - 1, bool)  # True where a piece joins a point with the next
     joined[lines.offsets[1:-1] - 1] = False

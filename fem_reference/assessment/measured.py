@@ -1,4 +1,4 @@
-"""A current candidate and its measures against the reference."""
+"""Measures of a candidate's current output against the reference."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from fem_reference.scenes.muscle import MuscleCase
 
 @dataclass(frozen=True, eq=False)
 class CurrentMeasures:
-    """The present candidate, measured against the ``reference`` with its ``error_bars``, None if unknown."""
+    """The current output of a candidate, measured against the ``reference`` with its ``error_bars``, None if unknown."""
 
     scene: MuscleCase
     candidate: Run

@@ -1,4 +1,4 @@
-"""Moment arms of fibres compared with published arms: a polynomial fit of length against angle, the fraction of poses whose arm is
+"""Moment arms of fibres compared with published ones: a polynomial fit of length against angle, the fraction of poses whose arm is
 within the fibres' range, and the overlap of two ranges.
 """
 
@@ -17,7 +17,7 @@ DEGREE, STEP = 4, 2.0
 
 @dataclass(frozen=True, eq=False)
 class ArmRange:
-    """The least and greatest moment arm ``low``, ``high`` (a,) [mm] of a muscle's fibres at ``angles`` (a,) [deg]."""
+    """The minimum and maximum moment arm ``low``, ``high`` (a,) [mm] of a muscle's fibres at ``angles`` (a,) [deg]."""
 
     angles: Floats
     low: Floats
@@ -63,7 +63,7 @@ def share_inside(curve: Floats, found: ArmRange) -> float:
 
 
 def overlap(found: ArmRange, published: ArmRange) -> float:
-    """The mean over the poses of the part of the ``published`` range that the ``found`` range covers; NaN if no pose is known."""
+    """The mean over the poses of the fraction of the ``published`` range that ``found`` covers; NaN if no pose is known."""
     known = np.isfinite(published.low) & np.isfinite(published.high)
     if not known.any():
         return float("nan")
@@ -79,7 +79,7 @@ class ArmsBeside:
     ends are equal for a curve.
 
     ``kind``: the kind of the experiment; ``sense``: the direction of rotation for positive moment arms; ``setting``: the resolution
-    of the run; ``coarser``: the greatest change of the mean moment arm over the poses [mm] on larger tetrahedra.
+    of the run; ``coarser``: the maximum change of the mean moment arm over the poses [mm] on larger tetrahedra.
     """
 
     case: str
@@ -100,7 +100,7 @@ class ArmsBeside:
 
     @property
     def share(self) -> float:
-        """The fraction of poses inside for a curve, else the overlap."""
+        """The fraction of poses with the curve inside the fibres' range, else the overlap."""
         return share_inside(self.published.low, self.found) if self.is_curve else overlap(self.found, self.published)
 
     @property
@@ -115,7 +115,7 @@ class ArmsBeside:
 
     @property
     def known(self) -> int:
-        """The number of poses in which the published moment arm is known; share, bias and scatter are taken over these."""
+        """The number of poses in which the published moment arm is known; :attr:`share`, bias and scatter are taken over these."""
         return int(np.isfinite(self._centre).sum())
 
     def between(self, first: float, last: float) -> "ArmsBeside":

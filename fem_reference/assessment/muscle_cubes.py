@@ -1,4 +1,4 @@
-"""Cubes of muscle under load: quantities measured in experiments, and the same quantities of a material."""
+"""Cubes of muscle under load: quantities measured in experiments, and the same quantities computed for a material."""
 
 import math
 from collections.abc import Callable
@@ -24,7 +24,7 @@ SHIPPED: Material = (make("neo_hooke", mu=0.01), VOLUME, make("fibre_passive", *
 class Quantity:
     """A measured quantity of a cube: its ``truth`` in ``unit`` from ``facts`` of an ``experiment``, its uncertainty ``within`` and
     the reason for it (``because``); ``of``: its value for a material. ``limit``: the reason why the shipped law cannot reach the
-    truth. ``is_order``: True for a stiffness ranking, whose value is 1 if reproduced, else 0, within 0.5.
+    truth. ``is_order``: True for a stiffness ranking: the value is 1 if it is reproduced, else 0, the tolerance 0.5.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Quantity:
 
 
 def with_collagen(fibres: float, k1: float, k2: float) -> Material:
-    """The shipped matrix with ``collagen_across`` of ``k1`` [MPa] and ``k2``, with the stress ``fibres`` [MPa] of its fibres."""
+    """The shipped matrix with ``collagen_across`` of ``k1`` [MPa] and ``k2``, and fibres with the stress ``fibres`` [MPa]."""
     passive = make("fibre_passive", **(FIBRES | {"stress": fibres}))
     return (*SHIPPED[:2], passive, make("collagen_across", k1=k1, k2=k2))
 

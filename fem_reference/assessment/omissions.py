@@ -10,7 +10,7 @@ from fem_reference.metrics import described, metric
 FORMAT = 1
 # Measures of a run with an omission, relative to the complete run of the same solver.
 MEASURES = tuple(".".join(key) for key in described("main") if metric(key[0]).OF != "field")
-# If all changes are below this share of the error bar, an omission does not matter.
+# If all changes are below this fraction of the error bar, an omission does not matter.
 NEGLIGIBLE = 0.1
 # Parts of the solving time that runs may report, and their names in runs; the total is a little more.
 PHASES = {"assembly": ("assembly",), "contact": ("contact",), "linear systems": ("factorisation", "krylov")}
@@ -22,9 +22,9 @@ Word = Literal["matters", "hardly", "does not matter", "not known"]
 @dataclass(frozen=True)
 class Omission:
     """A run and its outcome. ``left_out``: names of the omitted effects or features (none, one, or all that can be omitted);
-    ``instead``: settings that had to change because of this. A run that was not made has the status ``"refused"``.
+    ``instead``: settings that had to change because of the omission. A run that was not made has the status ``"refused"``.
 
-    ``changes``: by ``metric.statistic``, the greatest magnitude over the frames of the change from the complete run; left out if
+    ``changes``: by ``metric.statistic``, the maximum magnitude over the frames of the change from the complete run; left out if
     unknown in a frame. ``predicted``: the value of an indicator, if any, by ``metric.statistic``. ``costs``: as in the run.
     """
 
@@ -42,14 +42,14 @@ class Omission:
         return self.costs.get("seconds_processor_solve", self.costs.get("seconds_processor", math.nan))
 
     def phase(self, name: str) -> float:
-        """Processor time [s] of one of ``PHASES``: its share of the time of solving; NaN if unknown."""
+        """Processor time [s] of one of ``PHASES``: its fraction of the solving time times :attr:`seconds`; NaN if unknown."""
         spent = sum(self.costs.get(f"seconds_{part}", math.nan) for part in PHASES[name])
         return self.seconds * spent / (self.costs.get("seconds_solve") or math.nan)
 
 
 @dataclass(frozen=True)
 class Ablation:
-    """Runs ``name`` by ``solver``: the complete run (``whole``), and a run for each of ``omissions``; ``kept``: never omitted."""
+    """Runs ``name`` by ``solver``: the complete run (``whole``) and its ``omissions``; ``kept``: what is never omitted."""
 
     name: str
     solver: str
@@ -68,7 +68,7 @@ class Ablation:
 
 @dataclass(frozen=True)
 class CaseOmissions:
-    """The ablations of a case, the reference's first. ``bars``, ``units``: its error bars, the greatest over the frames, and their
+    """The ablations of a case, the reference's first. ``bars``, ``units``: its error bars, the maximum over the frames, and their
     units by ``metric.statistic``; ``unknown``: the reason why there are no bars; ``origin``: provenance of the measurements.
     """
 

@@ -34,7 +34,7 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Ranking:
-    """The ``places`` by one statistic, the least deviation first; ``title`` and ``unit`` of the statistic."""
+    """The candidates ranked by one statistic (``places``), the least deviation first; ``title`` and ``unit`` of the statistic."""
 
     title: str
     unit: str
@@ -49,7 +49,7 @@ class Ranking:
 
 
 def ranked(deviations: Iterable[Deviation]) -> tuple[Ranked, ...]:
-    """The places of ``deviations``: one is less than another if their bars do not overlap; NaN comes last.
+    """The places of ``deviations``: two differ in rank if their bars do not overlap; NaN comes last.
 
     >>> [place.rank for place in ranked([Deviation("a", 5.0, 0.4), Deviation("b", 2.0, 0.4), Deviation("c", 2.5, 0.4)])]
     ['1 to 2', '1 to 2', '3']

@@ -15,9 +15,9 @@ from fem_reference.foundations.errors import InputError
 
 TIME = "seconds_per_frame"
 Features = Mapping[str, float]  # the features of a case, by name
-# The number of other cases, the most similar ones, that are used.
+# The number of most similar other cases that are used.
 _ALIKE = 3
-# Margins are chosen so that this share of the expectations from other cases holds on each case that is left out.
+# Margins are such that this fraction of the values measured on left-out cases stays within the values expected from the others.
 _MET = 0.95
 # The features that determine similarity.
 _COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
@@ -58,7 +58,7 @@ class Margins:
 class Recommendation:
     """The ``best`` setting (None: no setting meets the limits) out of ``count``, including ``margins``; ``measured``: True if
     measured on the case itself; ``nearest``: the setting that misses the limits least, if no setting meets them; ``loads``: for
-    each setting, the share of the machine that other processes kept busy while it was timed.
+    each setting, the fraction of the machine that other processes kept busy while it was timed.
     """
 
     best: Expected | None
@@ -91,8 +91,8 @@ def recommend(
 
 
 def chosen(known: Sequence[Expected], limits: Mapping[str, float]) -> tuple[Expected | None, Expected | None]:
-    """The cheapest setting whose error is at most ``limits["error"]``, or the most accurate whose time per frame [s] is at most
-    ``limits["time"]``, with both limits the cheapest within both. If there is none, the setting that misses the limits least.
+    """The best setting within ``limits`` and, if there is none, the setting that misses them least. With a limit ``"error"``, the
+    best is the cheapest; with a limit ``"time"`` [s] per frame alone, the most accurate.
     """
     most = {"error": math.inf, "time": math.inf} | dict(limits)
     fitting = [one for one in known if one.error <= most["error"] and one.time <= most["time"]]
@@ -102,7 +102,7 @@ def chosen(known: Sequence[Expected], limits: Mapping[str, float]) -> tuple[Expe
 
 
 def known_settings(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> KnownSettings:
-    """The settings for a ``case`` with these features; only studies with the ``metric`` count. An error counts as measured plus
+    """The settings for a ``case`` with these features; only studies with the ``metric`` count. An error is the measured error plus
     the bar of the truth, as in the tables of a study.
     """
     studies = [study for study in studies if metric in study.units]
@@ -132,8 +132,8 @@ def _is_same(one: Features, other: Features) -> bool:
 
 
 def alike(features: Features, studies: Iterable[CaseStudy]) -> list[CaseStudy]:
-    """The studies of the cases most similar to a case with these features, the most similar first: by ratios, in powers of two;
-    cases with and without contact are far apart.
+    """The studies of the cases most similar to a case with these features, the most similar first: with the least sum of
+    absolute logarithms of the ratios of features. Cases with and without contact are far apart.
     """
 
     def distance(study: CaseStudy) -> float:
@@ -176,7 +176,7 @@ def _expected(features: Features, studies: Sequence[CaseStudy], metric: str, mar
 
 
 def scale(features: Features, other: Features, metric: str) -> float:
-    """The factor from an error on the ``other`` case to an error on this case: lengths scale with the motion, shares do not."""
+    """The factor from an error on the ``other`` case to an error on this case: lengths scale with motion, percentages do not."""
     return 1.0 if _is_share(metric) else features["motion"] / other["motion"]
 
 
@@ -230,7 +230,7 @@ def is_elsewhere(point: Point) -> bool:
 
 
 def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
-    """The size of a point's tetrahedra relative to the case's own before refinement, and its difference in refinements."""
+    """The ratio of a point's size of tetrahedra to the case's, both before refinement, and the case's refinements minus its own."""
     scene = point.choice["scene"]
     size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
     return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]
@@ -256,7 +256,7 @@ class Transfer:
 
     @property
     def loss(self) -> float:
-        """The ratio of the error to the least possible error, minus one: 0 if the chosen settings are the best on that case too."""
+        """The ratio of the error to the ``best`` error, minus one: 0 if the chosen settings are the best on that case too."""
         return self.error / self.best - 1
 
 

@@ -1,4 +1,4 @@
-"""Current measures against a baseline and against the reference: a verdict on every statistic, from its decisive frame."""
+"""Current measures compared with a baseline and with the reference: a verdict on every statistic, from its decisive frame."""
 
 import math
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ WORST_FIRST: tuple[Word, ...] = ("fail", "inconclusive", "pass")
 class Judgement:
     """The verdict on one ``question`` about the statistic ``name``, all numbers in ``unit`` and from the decisive frame.
 
-    ``was`` and ``current`` are its values, NaN if there is none; ``allowed`` is its greatest distance from its earlier value
+    ``was`` and ``current`` are its values, NaN if there is none; ``allowed`` is the maximum distance from its earlier value
     (``unchanged``) or from the reference (``within``), NaN if unknown; ``known`` is the error bar of that comparison value.
     """
 
@@ -129,7 +129,7 @@ class _Frames(NamedTuple):
 
 
 def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
-    """Judge whether the sampled vertices are unchanged, by the greatest distance [mm] of each frame."""
+    """Judge whether the sampled vertices are unchanged, by the maximum distance [mm] in each frame."""
     was = positions.points(len(current.rest), "baseline")
     with np.errstate(over="ignore"):  # squares of huge distances overflow and count as infinite
         away = np.linalg.norm(current.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
@@ -164,7 +164,7 @@ def _judged(
 
 
 def _word(was: float, value: float, truth: float, bar: float, *, allowed: float) -> Word:
-    """The verdict on one frame; inconclusive if there is no number before or now, fail if a number is new."""
+    """The verdict on one frame; inconclusive without a number before and now, fail if a number is new."""
     if math.isnan(was) and math.isnan(value):
         return "inconclusive"
     if math.isnan(truth):

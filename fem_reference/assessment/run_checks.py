@@ -24,27 +24,27 @@ from fem_reference.problems.setup import AttachedVertices, Bone
 from fem_reference.runs.contents import scalar_vectors, vector_names
 from fem_reference.runs.store import Run
 
-# A position is correct up to this share of the body's size; the rounding of stored values is a thousandth of this share.
+# A position is correct to this fraction of the body's size; the rounding of stored values is a thousandth of this.
 ROUNDING = 1e-9
-# Exactly attached vertices may be off their place on the bone by this strain (a stretch of 4) times their distance from facets.
+# Exactly attached vertices may be off their position on the bone by this strain (a stretch of 4) times their distance from facets.
 _STRAIN = 3.0
 # Safety factor on the mean extension of springs from the recorded force, as springs pull at other points of the surface.
 _SPRINGS = 1.5
-# The greatest rotation of a bone per load step, on average between two frames: beyond it the sense of rotation is unknown.
+# The maximum rotation of a bone per load step, on average between two frames: beyond it the sense of rotation is unknown.
 _TURN = 1.01 * math.pi / 2
 # Between contact points, half a spacing apart, a right-angled edge can penetrate by a quarter of the spacing, a crease by less.
 _BETWEEN, _CREASE = 0.25, 0.1
-# Self-contact of a part allows a penetration of less than this share of the spacing, for any recorded pressure.
+# Self-contact of a part allows a penetration of less than this fraction of the spacing, for any recorded pressure.
 _OWN = 0.5
-# A bone that penetrates by more than this share of half its thickness has broken through contact, whatever the stiffness.
+# A bone that penetrates by more than this fraction of half its thickness has broken through contact, whatever the stiffness.
 _GIVEN_WAY = 0.75
-# The greatest imbalance of forces, as a multiple of the residual of all unknowns together.
+# The maximum imbalance of forces, as a multiple of the residual of all unknowns together.
 BALANCE = 10.0
 
 
 @dataclass(frozen=True)
 class RunCheck:
-    """A check by ``name``: the ``value`` at a ``frame`` and ``place``, and its greatest ``allowed`` value, both in ``unit``."""
+    """A check by ``name``: the ``value`` at a ``frame`` and ``place``, and the maximum ``allowed`` value, both in ``unit``."""
 
     name: str
     value: float
@@ -60,7 +60,7 @@ class RunCheck:
 
     @property
     def share(self) -> float:
-        """The ratio of the value to the allowed value; infinite if either is not a number, or the value is above an allowed 0."""
+        """The ratio of the value to the allowed value; infinite if either is not a number; huge if 0 is allowed and exceeded."""
         return math.inf if math.isnan(share := self.value / (self.allowed or 1e-300)) else share
 
     def __str__(self) -> str:
@@ -98,7 +98,7 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch; allowed by smoothing, compliance, gaps between points, and overlap remaining from rest."""
+    """Overlap of parts that may touch; allowed are smoothing, compliance, gaps between points, and overlap remaining from rest."""
     for law in body.touching:
         apart, depth = longest_edge(body.mesh, law) / 4, partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
@@ -162,8 +162,8 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
 
 
 def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
-    """Exact attachments: distance of vertices from their positions moved with the bone, up to a strain times their distance from
-    the attached facets. Springs: their mean extension, the force divided by stiffness and area; in situ they carry a force at rest.
+    """Exact attachments: the distance of vertices from their position on the bone; allowed is a strain times their distance from
+    the attached facets. Springs: the mean extension; allowed is the force, in situ also that at rest, over stiffness and area.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets = Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])
@@ -201,7 +201,7 @@ def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
 
 
 def _travel(motion: RigidMotion, before: float, after: float) -> float:
-    """Travel of a bone between two frames [rad or mm]; in a motion out and back both directions count."""
+    """Travel of a bone between two frames [rad or mm]; both directions of a motion out and back count."""
     stops = [before, *(frame for frame in motion.frames if before < frame < after), after]
     return float(np.abs(np.diff(np.interp(stops, motion.frames, motion.amounts))).sum())
 
@@ -247,8 +247,8 @@ def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
 
 
 def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
-    """Penetration of the muscle and each bone in contact. If the surface, with possibly large triangles, is deeper than allowed,
-    the boundary of the tetrahedra is checked too: the check fails if both are too deep.
+    """Penetration of the muscle and each bone in contact. If the surface, with possibly large triangles, penetrates too deeply,
+    the boundary of the tetrahedra is checked too: the check fails if both penetrate too deeply.
     """
     rest, apart = run.surface, spacing(problem.surface)
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
@@ -265,7 +265,7 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 
 
 def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
-    """Overlap of a bone and the muscle. Above the ``give`` only the excess over rest counts. The bone's middle always fails."""
+    """Overlap of bone and muscle. Above ``give`` only the excess over rest counts; near the middle of the bone it always fails."""
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:

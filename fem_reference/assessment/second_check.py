@@ -39,7 +39,7 @@ def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
 
 
 def confirmed_run(problem: Callable[[], MuscleProblem | MusclesProblem], run: Run) -> Run:
-    """A converged ``run`` with its second check in the origin, stored with it; unchanged if it was checked by this code."""
+    """The ``run`` after the second check, which is stored in its origin; unchanged if this code has checked it before."""
     sources = b"".join(Path(str(one.__file__)).read_bytes() for one in (run_checks, neighbours, interpenetration))
     stored, code = run.origin.get(RECORD, {}), hashlib.sha256(sources).hexdigest()[:16]
     if stored.get("code") == code:
@@ -65,7 +65,7 @@ def trusted(problem: Callable[[], MuscleProblem | MusclesProblem], run: Run) -> 
 
 def _of_all(problem: MuscleProblem | MusclesProblem, run: Run, nodes: Nodes | None = None) -> RunChecks:
     """The checks of a muscle's ``run``, which may have ended early; for several muscles, the checks of each under its name, and
-    that none is inside another. ``nodes``: by default those in the folder of the run.
+    the check that none is inside another. ``nodes``: by default those in the folder of the run.
     """
     at = nodes or (lambda number: None if run.folder is None else places(run.folder, number)[1])
     if isinstance(problem, MuscleProblem):

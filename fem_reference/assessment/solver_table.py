@@ -18,7 +18,7 @@ FILE = Path(__file__).with_suffix(".toml")
 
 class SolverKind(Record):
     """A row of the report's table: its ``name``, the ``form`` of its model, the report's ``speed`` and ``precision`` in plus and
-    minus signs, the numbers of its ``literature`` in the report, and ``of_case``, names of candidates of cases that represent it.
+    minus signs, the numbers of its ``literature`` in the report, and ``of_case``, the names of candidates that represent it.
     """
 
     name: str
@@ -59,8 +59,8 @@ def _file() -> _File:
 @dataclass(frozen=True, eq=False)
 class SolverResult:
     """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] if known, and ``measures`` against
-    the reference; for the reference itself its error bars, empty if these were not requested. ``needs``: the parameters that a user
-    must give, by kind; empty if that is not known. ``unsound``: the reason why its frames are unusable, else empty.
+    the reference; for the reference itself its error bars, empty if these were not requested. ``needs``: the number of parameters
+    that a user must give, by kind; empty if unknown. ``unsound``: the reason why its frames are unusable, else empty.
     """
 
     kind: str
@@ -84,7 +84,7 @@ class SolverResult:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A scene: ``title``, ``triangles`` of the muscle, greatest displacement ``travel`` [mm] and outcome of the reference."""
+    """A scene: ``title``, ``triangles`` of the muscle, maximum displacement ``travel`` [mm] and outcome of the reference."""
 
     case: str
     title: str
@@ -130,7 +130,7 @@ class Table:
         return list(dict.fromkeys(one.name for one in self.results if one.kind == kind))
 
     def needs(self, kind: str, name: str) -> Mapping[str, int]:
-        """The parameters that ``name`` needs on the scene that needs most; empty if they are not known."""
+        """The number of parameters, by kind, that ``name`` needs on the scene that needs most; empty if unknown."""
         found = [one.needs for one in self._by(kind, name)]
         return max(found, key=lambda needs: sum(needs.values()), default={})
 

@@ -7,13 +7,13 @@ from fem_reference.geometry.distance import outer_windings
 from fem_reference.runs.store import Run
 
 # The ratio of enclosed volume to that of the reference: below the first value the body has collapsed, above the second it has
-# exploded. The worst of the shipped solvers has 0.8.
+# exploded. The lowest ratio of the shipped solvers is 0.8.
 _LEAST, _MOST = 0.5, 2.0
-# The greatest distance of a vertex from the reference, as a multiple of the size of the body.
+# The maximum distance of a vertex from the reference, as a multiple of the size of the body.
 _FARTHEST = 1.0
-# The share of the surface that may be inside out, in excess of the share in the reference.
+# The fraction of triangles that may be inside out, in excess of that fraction in the reference.
 _TURNED = 0.05
-# A vertex is stuck if it moves by less than the first share of the body's size, and in the reference by more than the second.
+# A vertex is stuck if it moves by less than the first fraction of the body's size, and in the reference by more than the second.
 _STILL, _MOVES = 1e-6, 1e-2
 
 

@@ -20,12 +20,12 @@ MATCHED_ERROR, MATCHED_TIME = 2.0, 0.1
 
 
 class Standing(Record):
-    """A solver ``name`` of a ``group`` on a ``case``. ``worst``: by ``metric.statistic`` its greatest deviation over the frames,
+    """A solver ``name`` of a ``group`` on a ``case``. ``worst``: by ``metric.statistic`` its maximum deviation over the frames,
     empty for the reference, which has ``bars``. ``from_rest``: rms distance [mm] of the last frame from the first, if the reference
     is back at rest there. ``unsound``: the reason why its frames are unusable. ``split``: root mean squares [mm] of the parts of
     its error. ``least_error``: the error [mm], if the time is at most the matched time; ``least_time``: the time [s], if the error
     is at most the matched error. ``truth``, ``run``: keys of the two runs; ``frames``: a hash of the positions. ``stale``: True if
-    case, reference, solver, protocol or time limit changed after the ``date``; ``time_limit``: the greatest processor time [s].
+    case, reference, solver, protocol or time limit changed after the ``date``; ``time_limit``: the allowed processor time [s].
     """
 
     case: str
@@ -67,7 +67,7 @@ class Standing(Record):
         return (self.truth, self.run, self.protocol) == (truth, run, PROTOCOL)
 
     def kept(self, missing: bool) -> "Standing":
-        """The row as it is kept if its case was not measured again; ``missing``: True if this was not possible."""
+        """The row if its case was not measured again; ``missing``: True if measuring it was not possible."""
         return self.model_copy(update={"stale": self.stale or missing or self.protocol != PROTOCOL})
 
     def asked(self, only: Collection[str]) -> bool:
@@ -97,7 +97,7 @@ class Standings(Record):
         )
 
     def overall(self) -> list["OverCases"]:
-        """Every solver over its cases, without stale rows, by group and share of cases that it solved, then by error."""
+        """Every solver over its cases, without stale rows, in order of group, fraction of solved cases, and error."""
         rows = [row for row in self.rows if not row.stale]
         solvers = dict.fromkeys((row.group, row.name) for row in rows)
         found = [OverCases.of([row for row in rows if (row.group, row.name) == one]) for one in solvers]
@@ -108,7 +108,7 @@ class Standings(Record):
 @dataclass(frozen=True)
 class OverCases:
     """A solver over ``count`` cases: the medians of its error in per cent of the travel (``share``, NaN for the reference) and of
-    its time [s], and the cases that it ``lost``.
+    its time [s], and the cases ``lost``, on which it failed.
     """
 
     group: str
@@ -120,7 +120,7 @@ class OverCases:
 
     @classmethod
     def of(cls, rows: Sequence[Standing]) -> "OverCases":
-        """The rows of one solver together."""
+        """The summary of the ``rows`` of one solver."""
         sound = [row for row in rows if not row.failed]
         shares = [value for row in sound if math.isfinite(value := _error(row, SHARE))]
         times = [row.seconds_per_frame for row in sound if row.seconds_per_frame is not None]

@@ -18,7 +18,7 @@ VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 
 class Bound(Record):
-    """A bound of healthy runs: a ``quantity`` of ``assessment.health`` is at most ``at_most``, at every or the ``last`` frame."""
+    """A bound that healthy runs meet: a ``quantity`` of :mod:`health` is at most ``at_most`` in every or the ``last`` frame."""
 
     quantity: str
     at_most: float = Field(ge=0)
@@ -111,7 +111,7 @@ Weighed = Sequence[tuple[Bound, History]]
 
 def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
     """``cell``, for a run that reached every frame, with the verdict by its first violated bound, else by the first bound. A
-    value that is not finite fails for any status; so does a ``contrast`` without the violation that it should show.
+    value that is not finite fails. ``contrast``: the reason if a bound should be violated; then a run fails if none is.
     """
     shown = _decisive(cell, weighed)
     if shown.value is None or shown.bound is None or not np.isfinite(shown.value):
@@ -137,7 +137,7 @@ def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> 
 
 
 def doubted(cell: Cell, doubt: str, no_solution: str) -> Cell:
-    """``cell`` with a ``doubt`` about the solver's result, if any: degraded, but correct if there is ``no_solution``."""
+    """``cell`` with a ``doubt`` about the solver's result, if any: degraded, or no solution if this is expected."""
     if not doubt or cell.verdict != "ok":
         return cell
     if no_solution:

@@ -1,4 +1,4 @@
-"""Records of the band of results for unknown parameters of a case, its sensitivities, and the candidates compared with it."""
+"""Records of uncertainty: the band of a case's results for unknown parameters, its sensitivities, and candidates in the band."""
 
 import math
 from dataclasses import dataclass, field
@@ -11,13 +11,13 @@ from fem_reference.io.texts import plain
 
 FORMAT = 1
 Place = Literal["inside", "undecided", "outside", "no answer", ""]
-# The rounding at the ends of a band, as a share of its width.
+# The rounding at the ends of a band, as a fraction of its width.
 _ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of a case by its ``key``, its ``title`` in words, its value in the case (``nominal``) and its range, in ``unit``."""
+    """A parameter of a case: its ``key``, its ``title`` in words, its value in the case (``nominal``) and range, in ``unit``."""
 
     key: str
     title: str
@@ -34,7 +34,7 @@ class Parameter:
         return self.low <= self.nominal <= self.high
 
     def value(self, place: float) -> float:
-        """The value at a ``place`` from -1 to 1 of the range, to six digits.
+        """The value at a ``place`` in the range, from -1 to 1, rounded to six digits.
 
         >>> Parameter("k", "k", "", 1.0, 1.0, 100.0, "log-uniform", "").value(0.0)
         10.0
@@ -42,7 +42,7 @@ class Parameter:
         return float(f"{self.at((place + 1) / 2):.6g}")
 
     def at(self, share: float) -> float:
-        """The value at the fraction ``share`` of the range, from 0 to 1, and beyond it; :meth:`place` is its inverse."""
+        """The value at the fraction ``share`` of the range, from 0 to 1 or beyond; :meth:`place` is its inverse."""
         if self.spread == "log-uniform":
             with np.errstate(over="ignore"):
                 return float(np.exp(math.log(self.low) + share * math.log(self.high / self.low)))
@@ -71,9 +71,9 @@ class Band:
     bar of this result, None if it has none. ``distance``: True for a distance from this result; smaller values are always inside.
 
     ``error``: the error of the surrogate, as a fraction of the variance, at runs excluded from its fit; NaN without a surrogate.
-    ``by``: the source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: the reason for the lack of a band.
-    ``first`` and ``total``: the fraction of the variance over all frames by key of the parameter; empty if the surrogate is not
-    accurate enough (``unreliable``).
+    ``by``: the source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: the reason why there is no band.
+    ``first`` and ``total``: the fractions of the variance over all frames that are due to each parameter, by its key; empty if the
+    surrogate is not accurate enough (``unreliable``).
     """
 
     quantity: str
@@ -95,20 +95,20 @@ class Band:
 
     @property
     def width(self) -> float:
-        """The greatest width over the frames, NaN without a band."""
+        """The maximum width over the frames, NaN without a band."""
         widths = self.high - (0.0 if self.distance else self.low)
         return float(np.nanmax(widths)) if np.isfinite(widths).any() else math.nan
 
     @property
     def greatest_bar(self) -> float:
-        """The greatest error bar over the frames, NaN without a bar."""
+        """The maximum error bar over the frames, NaN without a bar."""
         known = self.bar is not None and np.isfinite(self.bar).any()
         return float(np.nanmax(self.bar)) if known else math.nan  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A candidate in a band: by frame, its ``values``, its ``places`` (empty where none is expected), its distance ``beyond``."""
+    """A candidate in a band: by frame, its ``values``, its ``places`` (empty without a band), its distance ``beyond``."""
 
     candidate: str
     quantity: str
@@ -118,19 +118,19 @@ class Placed:
 
     @property
     def word(self) -> str:
-        """The worst point over the frames; empty if there is none."""
+        """The worst of :attr:`places`; empty if there is none."""
         found = set(self.places)
         return next((word for word in ("no answer", "outside", "undecided", "inside") if word in found), "")
 
     @property
     def share(self) -> float:
-        """The fraction of the frames in which it is inside; NaN if no frame counts."""
+        """The fraction of the frames in which the candidate is inside; NaN if no frame counts."""
         counted = [one for one in self.places if one]
         return counted.count("inside") / len(counted) if counted else math.nan
 
     @property
     def worst(self) -> float:
-        """The greatest distance beyond the band over the frames with an answer, 0 inside it; NaN without such frames."""
+        """The maximum distance beyond the band over the frames with an answer, 0 inside it; NaN without such frames."""
         counted = [far for far, one in zip(self.beyond, self.places, strict=True) if one not in ("", "no answer")]
         return float(max(counted, default=math.nan))
 

@@ -33,14 +33,14 @@ class Change:
 
     @property
     def further(self) -> Floats:
-        """The increase of the distance (f,), negative if it is nearer; infinite if a number was lost or found."""
+        """The increase of the distance (f,), negative if it fell; infinite if only one of the values is a number."""
         lost, found = np.isnan(self.now) & ~np.isnan(self.was), np.isnan(self.was) & ~np.isnan(self.now)
         further = np.abs(self.now) - np.abs(self.was)
         return np.where(lost, np.inf, np.where(found, -np.inf, further))
 
     @property
     def at(self) -> int:
-        """The index of the frame with the greatest change, if possible among changes that exceed their error bar."""
+        """The index of the frame with the largest change, if possible among changes that exceed their error bar."""
         change = self._counted if self._counted.any() else self.further
         return int(np.argmax(np.nan_to_num(np.abs(change), nan=-1.0, posinf=np.inf)))
 
@@ -61,7 +61,7 @@ class Change:
 
     @property
     def greatest(self) -> tuple[float, float]:
-        """The greatest earlier and present distance from the reference, NaN without a number."""
+        """The maximum earlier distance from the reference and the maximum present one, NaN without a number."""
         return greatest(np.abs(self.was)), greatest(np.abs(self.now))
 
     @property
@@ -77,7 +77,7 @@ class Change:
 
     @property
     def word(self) -> Word:
-        """The verdict on the change, neutral below rounding or the error bar; "mixed" is nearer in some frames, farther in some."""
+        """The verdict on the change, neutral below rounding or the error bar; "mixed" if its sign differs between frames."""
         if math.isnan(self.by):
             return "no number"
         if abs(self.by) <= 10.0 ** -PLACES[self.unit]:
@@ -89,7 +89,7 @@ class Change:
 
     @property
     def _counted(self) -> Floats:
-        """The changes (f,) that exceed rounding, their error bar and ``SHARE`` of the greatest; 0 for the others."""
+        """The changes (f,) that exceed rounding, their error bar and ``SHARE`` of the largest change; 0 for the others."""
         change = np.nan_to_num(self.further, nan=0.0, posinf=np.inf, neginf=-np.inf)
         finite = np.abs(change[np.isfinite(change)])
         least = max(10.0 ** -PLACES[self.unit], SHARE * float(finite.max(initial=0.0)))
@@ -97,7 +97,7 @@ class Change:
 
     @property
     def other(self) -> int | None:
-        """The index of the frame of a mixed change with the greatest opposite change; None for all others."""
+        """For a mixed change, the index of the frame with the largest change of opposite sign; None for all others."""
         if self.word != "mixed":
             return None
         return int(np.argmin(self._counted) if self.by > 0 else np.argmax(self._counted))
@@ -122,12 +122,12 @@ class Versions:
         return sum(one.word == word for one in self.changes)
 
     def of(self, word: Word) -> list[Change]:
-        """The statistics with this verdict, the greatest change first."""
+        """The statistics with this verdict, the largest change first."""
         return [one for one in self.changes if one.word == word]
 
     @property
     def place(self) -> tuple[int, int, float] | None:
-        """Frame index, vertex and distance [mm] of the greatest motion; None without motion."""
+        """Frame index, vertex and distance [mm] of the largest motion; None without motion."""
         known = np.nan_to_num(self.moved, nan=-1.0)
         i, k = np.unravel_index(int(np.argmax(known)), known.shape)
         if known[i, k] <= POSITION_ROUNDING:
@@ -136,7 +136,7 @@ class Versions:
 
 
 def of_runs(current: CurrentMeasures, before: CurrentMeasures, was: str) -> Versions:
-    """The versions, compared with another run of the same frames."""
+    """Compare the current measures with another run of the same frames."""
     if current.points.shape != before.points.shape:
         got, want = (one.points.shape[1] for one in (before, current))
         raise InputError("--against", f"{got} vertices", f"{want}, as in the candidate")
@@ -150,7 +150,7 @@ def of_runs(current: CurrentMeasures, before: CurrentMeasures, was: str) -> Vers
 
 
 def of_baseline(current: CurrentMeasures, baseline: Baseline, was: str) -> Versions:
-    """The versions, compared with the measures and sampled vertices of a baseline, rounded as there."""
+    """Compare the current measures with the measures and sampled vertices of a baseline, which are rounded."""
     names = {name: stored.unit for name, stored in baseline.measures.items()}
     known = {name: stored.numbers for name, stored in baseline.measures.items()}
     vertices, then = np.array(baseline.positions.vertices), baseline.positions.points(len(current.rest), "--against")

@@ -1,4 +1,4 @@
-"""The command line: the only place that prints, shows progress and exits."""
+"""The command line: the only part of the package that prints, shows progress and exits."""
 
 import argparse
 import json
@@ -16,15 +16,15 @@ from fem_reference.foundations import signals
 from fem_reference.foundations.errors import InputError, MissingSoftware
 
 DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
-# The status for an error in this program: EX_SOFTWARE of sysexits.h. Python's status for an exception is 1, here a verdict.
+# The status for an error in this program: EX_SOFTWARE of sysexits.h. Python exits with 1 after an exception; here 1 is a verdict.
 BROKEN = 70
-INTERRUPTED = 130  # the status that shells report
+INTERRUPTED = 130  # the status that shells report after an interrupt
 TRACEBACK_SETTING = "FEM_REFERENCE_TRACEBACK"
 _CHECKOUT = Path(__file__).resolve().parents[2]  # the checkout, or the folder in which the package is installed
 
 
 def entry() -> None:
-    """The installed command."""
+    """Run the installed command."""
     signals.listen()
     # Numpy reads this variable when it is loaded. On a busy machine, more threads would wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -32,7 +32,7 @@ def entry() -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Carry out a command line; returns the exit status."""
+    """Carry out a command line, and return the exit status."""
     options, log = argparse.Namespace(quiet=False), logging.getLogger("fem_reference")  # only our own messages
     level, handlers = log.level, log.handlers[:]
     try:
@@ -90,7 +90,7 @@ def _why_broken(error: BaseException) -> str:
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
-    """InputError if an output cannot be written, before anything is measured; creates nothing."""
+    """Raise InputError if an output cannot be written, before anything is measured; creates nothing."""
     _check_folder("--out", out(options), written=options.writes)
     if getattr(options, "to", None) is not None:
         _check_folder("--to", options.to.absolute().parent, written=True)
@@ -104,7 +104,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _check_name(name: str | None) -> None:
-    """InputError if ``--name`` cannot be the name of a page: the names of other files next to pages are reserved."""
+    """Raise InputError if ``--name`` cannot be the name of a page: the names of other files next to pages are reserved."""
     from fem_reference.report.asked import LONGEST  # imported here, as packages that it needs may be missing
 
     taken = ("runs", "docs", "index")
@@ -114,7 +114,7 @@ def _check_name(name: str | None) -> None:
 
 
 def _check_folder(place: str, folder: Path, *, written: bool) -> None:
-    """InputError at ``place`` unless ``folder`` is a folder or can be made, and, if it is to be ``written``, is writable."""
+    """Raise InputError at ``place`` unless ``folder`` exists or can be made, and is writable if it is to be ``written``."""
     there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     if not there.is_dir():
         raise InputError(place, f'"{folder}", where "{there}" is a file', "a folder")

@@ -25,7 +25,7 @@ from fem_reference.studies.execution import Bench
 
 
 def scene_of(options: argparse.Namespace) -> Case:
-    """The case with the changes by ``--set``, the effects that it needs, and the expectations of all candidates by ``--limit``."""
+    """The case with the changes of ``--set``, the effects that it needs, and the expectations of ``--limit`` on all candidates."""
     if options.negative_control and options.set:
         raise InputError("--negative-control", "this option with --set", "only one of the two")
     changes = dict(map(casefile.setting, options.set))
@@ -101,7 +101,7 @@ def command_parts(own: Iterable[Candidate]) -> list[Part]:
 
 
 def check_names(names: list[str]) -> None:
-    """InputError if two candidates have the same name, or one has the name of the reference."""
+    """Raise InputError if two candidates have the same name, or one has the name of the reference."""
     for name in names:
         if name == "reference":
             raise InputError("--candidate", '"reference"', "another name: candidates are measured against this run")
@@ -110,7 +110,7 @@ def check_names(names: list[str]) -> None:
 
 
 def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[C]:
-    """The bench of a case; InputError for wrong expectations, solvers or names, and for error bars that are not possible."""
+    """The bench of a case; InputError for wrong expectations, solvers or names, and for error bars that cannot be computed."""
     if options.error_bar and not scene.parts:
         casefile.muscle(scene, "--error-bar")
     check_names([entry.name for entry, _ in chosen])

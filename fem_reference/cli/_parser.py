@@ -49,7 +49,7 @@ _SHARED: dict[str, dict[str, Any]] = {
     },
     "--negative-control": {
         "action": "store_true",
-        "help": "apply the case's negative control, a change with which its verdict must be fail",
+        "help": "apply the case's negative control, a change that must turn its verdict to fail",
     },
     "--name": {
         "dest": "page_name",
@@ -86,7 +86,7 @@ def verb(name: str) -> ModuleType:
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
-    """The parser of the whole command line; with ``only`` it imports this verb alone, as loading all verbs takes seconds."""
+    """The parser of the command line; with ``only``, with the options of that verb alone, as importing all takes seconds."""
     about = "Finite element reference and validation for muscle deformation."
     whole = argparse.ArgumentParser(prog="fem-reference", description=about)
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
@@ -113,7 +113,7 @@ def _add(verb: ModuleType, sub: argparse.ArgumentParser) -> None:
 
 
 class _Given(argparse.Action):
-    """The action of an option that may be given only once, as a second value would replace the first; a list drops repeats."""
+    """The action of an option that may be given only once, as a second value would replace the first; lists drop repetitions."""
 
     def __call__(self, parser: Any, namespace: Any, values: Any, option_string: str | None = None) -> None:
         del parser

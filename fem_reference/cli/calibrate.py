@@ -18,7 +18,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     share(parser, "case", "--set")
     data = "CSV file with the columns frame, quantity, value, unit, sd"
     parser.add_argument("--to", type=Path, required=True, metavar="FILE", help=data)
-    fit = "a number of the case that has a range, such as effect[0].mu; may be repeated"
+    fit = "a parameter of the case that has a range, such as effect[0].mu; may be repeated"
     parser.add_argument("--fit", action="append", default=[], metavar="KEY", help=fit)
     share(parser, "--workers", "--scheduler")
 

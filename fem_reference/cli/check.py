@@ -1,4 +1,4 @@
-"""The verb ``check``: a candidate against its own earlier results and against the reference, for continuous integration.
+"""The verb ``check``: a candidate compared with its own earlier results and with the reference, for continuous integration.
 
 An inconclusive result has exit status 0: an uncertain reference is not the fault of the checked change. The text and the Markdown
 file call such a result inconclusive, the JUnit file skipped.
@@ -26,11 +26,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     either = "a candidate of the case or a folder of frames"
     parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=either)
     share(parser, "--unit")
-    one = "the muscle to judge, in a case of several; the reference solves all of them, a candidate each by itself"
+    one = "the muscle to judge, if the case has several; the reference solves them together, a candidate one by one"
     parser.add_argument("--muscle", default="", metavar="NAME", help=one)
     past = "JSON file of the candidate's earlier measures"
     parser.add_argument("--baseline", type=Path, required=True, metavar="FILE", help=past)
-    anew = "rewrite the baseline from the current measures; its tolerances and limits stay"
+    anew = "rewrite the baseline from the current measures; its tolerances and limits are kept"
     parser.add_argument("--update", action="store_true", help=anew)
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the judgements as JUnit XML")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the worst judgements for a pull request")
@@ -38,7 +38,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Judge a candidate by its baseline, which ``--update`` writes first."""
+    """Judge a candidate by means of its baseline, which ``--update`` writes first."""
     begin = time.perf_counter()
     case, muscle = scene_of(options), options.muscle
     arguments.check_muscle(muscle, case, "--muscle")

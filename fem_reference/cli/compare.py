@@ -1,4 +1,4 @@
-"""The verb ``compare``: candidates against the reference, or a candidate against its earlier version."""
+"""The verb ``compare``: candidates compared with the reference, or a candidate with its earlier version."""
 
 import argparse
 from pathlib import Path
@@ -31,7 +31,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     past = "write the page of changes since earlier results (a baseline of check, a stored run or a folder of frames)"
     parser.add_argument("--against", type=Path, metavar="BASELINE", help=past)
     share(parser, "--unit")
-    limit = "judge candidates: the greatest allowed deviation of a statistic, such as surface_deviation.max='5 mm'; may be repeated"
+    limit = "judge candidates: the maximum allowed deviation of a statistic, such as surface_deviation.max='5 mm'; may be repeated"
     parser.add_argument("--limit", action="append", default=[], metavar="METRIC.STATISTIC=VALUE", help=limit)
     share(parser, "--error-bar", "--negative-control", "--name", "--ranks")
 

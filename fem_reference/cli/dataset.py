@@ -12,7 +12,7 @@ HELP = "build a data set for machine learning: random muscles and shipped cases,
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb: the folder and the sizes."""
+    """Add the options for the folder and the sizes."""
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="a new folder, or one of an interrupted build")
     parser.add_argument("--muscles", type=positive, default=24, metavar="N", help="random muscles (default: 24)")
     parser.add_argument(

@@ -1,4 +1,4 @@
-"""The verb ``effects``: the change and the cost of each effect of a case."""
+"""The verb ``effects``: the change of the result due to each effect of a case, and the time that the effect costs."""
 
 import argparse
 

@@ -24,7 +24,7 @@ PARAVIEW = "paraview"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb: the folder, and the formats."""
+    """Add the options for the folder and the formats."""
     share(parser, "case", "--set")
     folder = "a new or empty folder"
     parser.add_argument("--to", type=Path, required=True, metavar="DIR", help=folder)

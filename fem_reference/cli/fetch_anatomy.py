@@ -13,7 +13,7 @@ HELP = "write the anatomy that some cases need into a folder, from downloaded fo
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb: the downloads and the folder; it writes nothing into ``--out``."""
+    """Add the options for the downloads and the folder; the verb writes nothing into ``--out``."""
     about = "a folder or an archive (zip, tar) that you have downloaded; several are searched together"
     parser.add_argument("sources", nargs="+", metavar="FOLDER_OR_ARCHIVE", type=Path, help=about)
     parser.add_argument("--to", type=Path, required=True, metavar="DIR", help="a new or empty folder")

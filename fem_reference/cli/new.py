@@ -14,7 +14,7 @@ HELP = "write a scene to start from: a copy of a case, or a scene of your own mu
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb; it writes nothing into ``--out``."""
+    """Add the options; the verb writes nothing into ``--out``."""
     parser.set_defaults(writes=False)
     parser.add_argument("name", metavar="NAME", type=Path, help="the folder to create; its name is the scene's name")
     parser.add_argument("--from", dest="case", metavar="CASE", help="the case to copy (default: hip_flexion)")
@@ -22,7 +22,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--muscle", type=Path, metavar="FILE", help=muscle)
     bones = "triangle surface of a bone, named after the file; give --bone at least twice"
     parser.add_argument("--bone", type=Path, action="append", default=[], metavar="FILE", help=bones)
-    unit = f"unit of length of these files: {', '.join(LENGTH_UNITS)} (default: guessed from the sizes of all of them, and printed)"
+    unit = f"unit of length of these files: {', '.join(LENGTH_UNITS)} (default: guessed from the sizes of all files, and printed)"
     parser.add_argument("--unit", metavar="UNIT", help=unit)
 
 

@@ -1,4 +1,4 @@
-"""The verb ``recommend``: a solver and setting for an error or a time, from the results of studies."""
+"""The verb ``recommend``: a solver and setting within a limit of error or time, from the results of studies."""
 
 import argparse
 import math
@@ -21,12 +21,12 @@ from fem_reference.studies.features import features
 # The notations for frames per second, and for a time per frame.
 _RATES = ("fps", "Hz", "frames/s", "1/s")
 _PER_FRAME = re.compile(r"\s*(?:/|per)\s*frame\s*$")
-HELP = "recommend a solver and setting for an error or a time, from the results of studies"
+HELP = "recommend a solver and setting within a limit of error or time, from the results of studies"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     share(parser, "case", "--set")
-    error = "the greatest error that you accept, in the unit of the metric, such as '2 mm' or '1 %%'"
+    error = "the maximum error that you accept, in the unit of the metric, such as '2 mm' or '1 %%'"
     parser.add_argument("--error", metavar="VALUE", help=error)
     time = "the longest time per frame that you accept, such as '5 ms' or '60 fps'"
     parser.add_argument("--time", metavar="VALUE", help=time)
@@ -35,7 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Recommend a setting or, without a request, the settings on a study's page; exit status 1 if no setting meets a request."""
+    """Recommend a setting or, without limits, answer the usual requests to studies; exit status 1 if no setting meets a request."""
     scene, metric = casefile.muscle(scene_of(options)), options.metric
     studies = cost.stored(out(options))
     units = {name: unit for study in reversed(studies) for name, unit in study.units.items()}
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _number(given: str, text: str, unit: str, place: str) -> float:
-    """A quantity above zero, by its ``text`` in the ``given`` value, which messages name."""
+    """A positive quantity from its ``text``, a part of the ``given`` value; messages quote the latter."""
     try:
         value = in_unit(text, unit)
     except ValueError as error:

@@ -29,7 +29,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "a folder NAME with a program NAME.py and its candidate.toml, such as candidates/newton_vbd; may be repeated"
     )
     parser.add_argument("--program", action="append", default=[], type=Path, metavar="DIR", help=program)
-    submitted = "a folder of frames; candidate.toml has case, name, version, sha256; no code is run; may be repeated"
+    submitted = "a folder of frames; candidate.toml states case, name, version, sha256; no code is run; may be repeated"
     parser.add_argument("--submission", action="append", default=[], type=Path, metavar="DIR", help=submitted)
     only = f"measure only new rows and the rows in these states ({','.join(STATES)}); keep all others"
     parser.add_argument("--only", default="", metavar="STATES", help=only)

@@ -24,7 +24,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Solve a case with other parameters at its quick size, which ``--set`` overrides, and write the page."""
+    """Solve a case with varied parameters, at its quick size, which ``--set`` overrides, and write the page."""
     scene = muscle_case(options.case, options, quick=True)
     workers = Workers(options.workers, options.scheduler)
     found = uncertainty.study(scene, out(options) / "runs", workers, options.runs, options.seed)

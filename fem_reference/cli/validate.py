@@ -16,7 +16,7 @@ HELP = "make all checks of a case that are possible before it is solved, and est
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the verb; it writes nothing into ``--out``."""
+    """Add the options; the verb writes nothing into ``--out``."""
     parser.set_defaults(writes=False)
     share(parser, "case", "--set")
 

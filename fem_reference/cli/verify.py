@@ -20,7 +20,7 @@ HELP = "measure problems with known answers, and write the page"
 def add_options(parser: argparse.ArgumentParser) -> None:
     known = "an entry, a group or a shell pattern of entries (default: all)"
     parser.add_argument("names", metavar="NAME", nargs="*", help=known)
-    control = "measure this entry with its deliberate mistake, with which it must fail; may be repeated"
+    control = "measure this entry with its deliberate mistake, which must make it fail; may be repeated"
     parser.add_argument("--negative-control", action="append", default=[], metavar="NAME", help=control)
     share(parser, "--name")
 

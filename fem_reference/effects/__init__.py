@@ -1,13 +1,13 @@
 """Effects: one file each, named as in scene files. A problem sums its effects and adds nothing else.
 
-Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters, with one expression, written once,
-with operators and the functions of ``Functions`` only. So a solver can use the expression symbolically, and a test can evaluate it
-in numpy. An ``Effect`` of a body is of one of three kinds: an ``Energy`` per unit rest volume, a ``Load`` on a part of its surface
-(a traction, where no energy exists), or a ``Prestrain``, which changes the deformation on which the energies depend. A
-``FieldEffect`` acts on a scalar field psi and has a weak form.
+Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters, with one expression, written only
+with operators and the functions of ``Functions``. So a solver can use the expression symbolically, and a test can evaluate it in
+numpy. An ``Effect`` of a body is an ``Energy`` per unit rest volume, a ``Load`` on a part of its surface (a traction, or an energy
+per unit rest area), a ``Prestrain``, which changes the deformation on which the energies depend, or an ``Interaction``, whose
+expression belongs to a problem. A ``FieldEffect`` acts on a scalar field psi and has a weak form.
 
-A solver may replace the parameters of an effect by symbols, so that one compiled form serves all their values. So an expression
-never branches on a parameter, and applies only operators and ``state.functions`` to parameters.
+A solver may replace the parameters of an effect by symbols, so that one compiled form serves all their values. Therefore an
+expression never branches on a parameter, and applies only operators and ``state.functions`` to parameters.
 """
 
 import importlib
@@ -39,8 +39,8 @@ class Effect(Record):
     """A frozen record of the parameters of an effect on a body.
 
     ``unknowns``: names of the fields that it adds. ``needs``: its requirements, among ``"fibre"`` (fibre directions at rest),
-    ``"interval"`` (the time between frame numbers) and ``"momentum"`` (velocities and predicted displacements in a load step).
-    ``outer``: True if the effect acts from outside the body, so that its forces do not balance. ``example``: some of its parameters
+    ``"interval"`` (the time between frame numbers) and ``"momentum"`` (velocities, and displacements predicted for a load step).
+    ``outer``: True if the effect acts from outside the body, so its forces do not sum to zero. ``example``: some of its parameters
     as in scene files, without those of its base class. ``published``: the ranges of its parameters in the literature on muscle, by
     name.
     """
@@ -170,7 +170,7 @@ class PassiveFibres(Energy):
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The tension of the fibres at the greatest expected stretch, compared with the stiffness of the matrix."""
+        """The tension of the fibres at the maximum expected stretch, compared with the stiffness of the matrix."""
         greatest = scene.stretch[1]
         pull = fibre_tension(self.energy, greatest)
         return fibre_indicator(scene, pull, scene.shorten(pull, 0.1 * (greatest - 1)))
@@ -198,7 +198,7 @@ class Load(Effect):
 
 
 class Interaction(Effect):
-    """An effect between a body and the bones or muscles around it, made by a problem from a scene."""
+    """An effect between a body and the bones or muscles around it, which a problem formulates."""
 
 
 class Prestrain(Effect):
@@ -219,7 +219,7 @@ def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
 
 
 def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
-    """The sum of the energies per unit rest volume [MPa] of ``acting``, (effect, amount) each, at ``state``, whose F is the total
+    """The sum of the energies per unit rest volume [MPa] of ``acting`` (effect, amount) pairs at ``state``, whose F is the total
     deformation gradient. A prestrain changes the F before the step and the present F in the same way, so its ramp causes no rate.
     """
     state = elastic_state(acting, state)
@@ -260,7 +260,7 @@ def find(name: str) -> type[Record]:
 
 
 def name_of(effect: Record | type[Record]) -> str:
-    """The name of an ``effect`` or its kind in scene files, which is the name of its file."""
+    """The name in scene files of an ``effect`` or of a kind of effects, which is the name of its file."""
     return effect.__module__.rpartition(".")[2]
 
 

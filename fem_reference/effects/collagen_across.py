@@ -8,19 +8,19 @@ from pydantic import Field
 from fem_reference.effects import Energy, Moduli, State
 from fem_reference.foundations.units import PositivePressure
 
-# The cosines of twice the angle, evenly over half a turn; Python floats, as numpy floats would turn symbols into arrays.
+# The cosines of twice the angles, spread evenly over half a turn; Python floats, as numpy floats would turn symbols into arrays.
 _DIRECTIONS = 8
 COSINES = [float(np.cos((j + 0.5) * np.pi / _DIRECTIONS)) for j in range(_DIRECTIONS)]
-# The square root has no derivative at 0, so this share of the squared mean is added to the squared spread.
+# The square root has no derivative at 0, so this fraction of the squared mean is added to the squared spread.
 _ROUNDING = 1e-13
 
 
 class CollagenAcross(Energy):
-    """The mean over all directions a across the fibre of ``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` while ``I = J^(-2/3) a . C a`` is
+    """The mean over all directions a across the fibre of ``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` where ``I = J^(-2/3) a . C a`` is
     above 1, else 0.
 
     ``k1`` [MPa], ``k2`` without unit. In the plane across the fibre, I is ``mean + spread cos(2 angle)``. There the mean is half
-    the trace of C, and ``mean^2 - spread^2`` its determinant. Eight angles are summed.
+    the trace of ``J^(-2/3) C``, and ``mean^2 - spread^2`` its determinant. Eight angles are summed.
 
     Source: integration over the directions of collagen, as in Bleiler, Ponte Castaneda and Roehrle 2019, doi
     10.1016/j.jmbbm.2019.05.012, for muscle, which is then stiffer in tension across its fibres than along them; here only

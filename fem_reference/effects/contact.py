@@ -1,4 +1,4 @@
-"""Contact of bones with the muscle, with any amount of sliding; attached parts and the parts near them are exempt."""
+"""Contact of bones with the muscle, with finite sliding; attached parts and the parts near them are exempt."""
 
 import math
 from collections.abc import Iterable

@@ -4,7 +4,7 @@ from typing import Any
 
 from fem_reference.effects import LameLaw, State
 
-# Newton steps for the sum of the stretches: relative error 4e-11 for stretches from 0.3 to 3, greater in inverted states.
+# Newton steps for the sum of the stretches: relative error 4e-11 for stretches from 0.3 to 3, larger in inverted states.
 _STEPS = 4
 
 
@@ -13,7 +13,7 @@ class Corotated(LameLaw):
     consistent invertible elasticity, eq. 8).
 
     ``mu``, ``lame``: Lame's parameters [MPa]. ``|F - R|^2`` is ``I1 - 2 s + 3``, where s is the sum of the principal stretches, the
-    greatest root of ``(s^2 - I1)^2 = 4 (I2 + 2 J s)``. For J < 0, four Newton steps leave an energy up to 6 % too small.
+    largest root of ``(s^2 - I1)^2 = 4 (I2 + 2 J s)``. For J < 0, four Newton steps leave an energy up to 6 % too small.
     """
 
     def energy(self, state: State) -> Any:

@@ -25,7 +25,7 @@ class Damping(Energy):
     coefficient: VolumeDamping
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The sag of a beam under the drag, and the shift of a bar along it."""
+        """The sag of a beam under the drag, and the shift of a bar along its axis."""
         force, sideways = (self.coefficient * scene.in_time(speed) for speed in (scene.speed, scene.sideways))
         rule, stress = "drag per cross-section divided by the shear modulus", force * scene.length
         lag = scene.lag(scene.bend(sideways) + scene.draw(force))

@@ -1,4 +1,4 @@
-"""Active muscle fibres: a tension that activation causes, greatest at their optimal length."""
+"""Active muscle fibres: a tension that activation causes, maximal at their optimal length."""
 
 from typing import Any, ClassVar
 

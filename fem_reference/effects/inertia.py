@@ -16,8 +16,8 @@ class Inertia(Energy):
     The method is the member of the generalised-alpha family with stresses taken at the end of a step (Wood, Bossak and Zienkiewicz
     1980, doi 10.1002/nme.1620151011; Chung and Hulbert 1993, doi 10.1115/1.2900803, with alpha_f = 0): ``alpha = (r - 1) / (r +
     1)``, ``gamma = 1/2 - alpha``, ``beta = (1 - alpha)^2 / 4``. A step scales the shortest waves by r, the ``spectral_radius``: 1
-    keeps them (the trapezoidal rule), 0 removes them at once. Long waves keep their energy. The end of a step minimises the sum of
-    ``density (1 + r) rate^2 |u - predicted|^2``, which is a potential of the step and no stored energy, and all other energies.
+    keeps them (the trapezoidal rule), 0 removes them at once. Long waves keep their energy. The displacement at the end of a
+    step minimises the sum of all other energies and ``density (1 + r) rate^2 |u - predicted|^2``, a potential of the step.
 
     ``density``: at rest [tonne/mm^3]; ``spectral_radius``: from 0 to 1.
     """

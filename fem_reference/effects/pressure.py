@@ -19,7 +19,7 @@ class Pressure(Ramped, Load):
 
     On the entire surface of a body that can shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is exactly 1 - p / K. A
     clamped part keeps its size, and the body around it is sheared: in a cube of side L with one clamped triangle with legs a, V/V0
-    is greater by 0.15 mu / K (a / L)^3 p / K. For example, it is 0.9002 instead of 0.9 if a is L/2 and K is 10 mu.
+    is larger by 0.15 mu / K (a / L)^3 p / K. For example, it is 0.9002 instead of 0.9 if a is L/2 and K is 10 mu.
     """
 
     example: ClassVar[dict[str, Any]] = {"pressure": "8 kPa"}

@@ -10,7 +10,7 @@ class Source(FieldEffect):
     """``-f``, a source of strength f. Report eq. 4.4: ``D f``.
 
     ``strength``: f, a number or a formula of the coordinates [psi / time]; ``where``: everywhere, or only where y is above the mean
-    y of the mesh's vertices, as in listing 4.5, line 17. An element that this line cuts has f in proportion to its share above.
+    y of the mesh's vertices, as in listing 4.5, line 17. In an element cut by this line, f is multiplied by the fraction above.
     """
 
     example: ClassVar[dict[str, Any]] = {"strength": "x*y", "where": "everywhere"}

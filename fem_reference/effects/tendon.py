@@ -11,8 +11,8 @@ class Tendon(Interaction):
     surface, within ``reach`` of the ends of the fibres that continue into the ``tendon`` of an attachment. They end at the point of
     this tendon on the bone.
 
-    ``on``: the attachment; ``stiffness`` [N/mm]: the stiffness of all lines together, divided among them by area into shares k: ``E
-    A / l0`` for a tendon of modulus E and cross-section A; ``reach`` [mm]. A tendon is slack at rest and not allowed with
+    ``on``: the attachment; ``stiffness`` [N/mm]: the stiffness of all lines together, ``E A / l0`` for a tendon of modulus E and
+    cross-section A; each line has a stiffness k in proportion to area; ``reach`` [mm]. A tendon is slack at rest and excluded with
     ``in_situ``. Source: Zajac 1989 (Crit. Rev. Biomed. Eng. 17:359), the tendon as a spring in series, here linear.
     """
 

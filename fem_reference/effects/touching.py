@@ -10,13 +10,13 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
 class MuscleContact(Interaction):
-    """The pressure law of ``contact``, applied equally to both sides of the gap between two muscles, or between places of a single
-    muscle, with any amount of sliding (``fem_reference.problems.touching.Touching``).
+    """The pressure law of ``contact``, applied equally to both sides of the gap between two muscles, or between parts of a single
+    muscle, with finite sliding (``fem_reference.problems.touching.Touching``).
 
     ``stiffness`` [MPa/mm]: under the pressure p the two sides overlap by at most p / stiffness. ``smoothing`` [mm]: the distance at
-    which contact begins, and the greatest overlap of two muscles, or of a muscle with itself, that is allowed at rest.
+    which contact begins, and the maximum overlap of two muscles, or of a muscle with itself, that is allowed at rest.
     ``friction``: the coefficient of Coulomb's law, greater than 0; without it contact is frictionless. ``own_normals``: True if
-    the gap between two muscles is measured along the normal of each point instead of to the nearest place, without friction. Each
+    the gap between two muscles is measured along the normal of each point instead of to the nearest point; not with friction. Each
     of several muscles touches the others but not itself.
     """
 

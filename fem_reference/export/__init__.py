@@ -72,7 +72,7 @@ def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, more: str) ->
 
 
 def _write_several(case: Case, problem: MusclesProblem, folder: Path, form: Format) -> None:
-    """Write a folder for each muscle, and a text on all muscles."""
+    """Write a folder for each muscle, and a text about all of them."""
     for part, (name, one) in zip(_parts(case), problem.problems.items(), strict=True):
         (folder / name).mkdir()
         _write(part.model_copy(update={"name": case.name}), one, folder / name, "")

@@ -1,7 +1,7 @@
 """A problem as FEBio's input file (febio_spec 4.0): quadratic tetrahedra, rigid bones moved by load curves, sliding contact.
 
 Based on FEBio's feature manual (febiosoftware/febio-feature-manual) and the sources of FEBio and FEBio Studio that read and write
-such files; FEBio 4.11 was run with exported files. FEBIO.md lists what is identical, and the measured differences. Time is
+these files; FEBio 4.11 was run with exported files. FEBIO.md lists what is identical, and the measured differences. Time is
 the frame number minus the first frame number.
 """
 
@@ -88,7 +88,7 @@ def add_comments(root: Element, texts: Iterable[str]) -> None:
 
 
 def model(problem: MuscleProblem) -> Element:
-    """The whole input file."""
+    """The complete input file."""
     root = Element("febio_spec", version="4.0")
     add_comments(root, (units(problem.frames[0]), *notes(problem)))
     SubElement(root, "Module", type="solid")
@@ -105,7 +105,7 @@ def model(problem: MuscleProblem) -> Element:
 
 
 def _control(root: Element, problem: MuscleProblem) -> None:
-    """Add the control of steps from frame to frame, which are at most ``LONGEST_STEP`` long, and shorter where FEBio needs it."""
+    """Add the control of steps, which are at most ``LONGEST_STEP`` long, shorter where FEBio needs it, and end at each frame."""
     control, step = SubElement(root, "Control"), _step(problem)
     steps = round((problem.frames[-1] - problem.frames[0]) / step)
     settings = {"analysis": "STATIC", "time_steps": steps, "step_size": step}

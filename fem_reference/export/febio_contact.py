@@ -21,18 +21,18 @@ from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices
 
 SEARCH_RADIUS = 5.0  # FEBio looks for contact up to this depth inside a bone [mm]
-# The greatest initial pressure of an overlap at rest, in shear moduli of the matrix. In gluteus_maximus_anatomical a search radius
+# The maximum initial pressure of an overlap at rest, in shear moduli of the matrix. In gluteus_maximus_anatomical a search radius
 # of 5 mm gives up to 34, and FEBio did not complete its first step; a radius of 0.1 mm gives up to 10, and it did.
 _AT_ONCE = 10.0
 SPRING_SEARCH_RADIUS = 1.0  # the search radius of springs [mm], whose two surfaces coincide at rest
 # Contact by penalty alone, in one pass, with the given penalty and the complete tangent.
 PENALTY = {"laugon": 0, "two_pass": 0, "auto_penalty": 0, "symmetric_stiffness": 0}
-# FEBio 4.11 has run springs over facets only: the force on the femur differs by 5.3 % on gluteus_medius and 8.8 % on
+# In FEBio 4.11, only springs over facets have been run: the force on the femur differs by 5.3 % on gluteus_medius and 8.8 % on
 # gluteus_maximus.
 MEASURED = (
-    "FEBio 4.11 has not run springs at points yet. In the reference, springs at the nearest points change the force on the femur "
-    "by 0.4 % and positions by 0.01 mm (rms; gluteus_medius, frame 20), with 12 mm tetrahedra by 1.2 % and 0.04 mm; springs over "
-    "facets change them by 5.8 % and 0.17 mm (FEBio 4.11: 5.3 and 8.8 % of the force, up to 1.1 mm, on two hip muscles)"
+    "Springs at points have not been run in FEBio 4.11. In the reference, springs at the nearest points change the force on the "
+    "femur by 0.4 % and positions by 0.01 mm (rms; gluteus_medius, frame 20), with 12 mm tetrahedra by 1.2 % and 0.04 mm; springs "
+    "over facets change them by 5.8 % and 0.17 mm (FEBio 4.11: 5.3 and 8.8 % of the force, up to 1.1 mm, on two hip muscles)"
 )
 _FELT = 1e-3  # the least overlap at rest that is reported [mm]
 
@@ -65,13 +65,13 @@ def pair(contacts: Element, kind: str, name: str, settings: dict[str, float]) ->
 
 
 def penalty(problem: MuscleProblem, attached: AttachedVertices) -> float:
-    """The penalty [MPa/mm] of springs: over facets their stiffness; at points a greater value, as the triangles are smaller."""
+    """The penalty [MPa/mm] of springs: over facets their stiffness; at points a larger value, as the triangles are smaller."""
     assert attached.stiffness is not None  # the attachment is by springs
     return attached.stiffness / (febio_mesh.SHRUNK if attached.attachment in problem.attached_skins else 1.0)
 
 
 def overlaps(problem: MuscleProblem) -> dict[str, float]:
-    """The greatest depth [mm] of the contact surface inside each bone in contact at rest, by corners and middles; 0 outside."""
+    """The maximum depth [mm], at rest, of corners and middles of the contact surface inside each bone in contact; 0 outside."""
     if not problem.obstacles:
         return {}
     corners = problem.mesh.points[febio_mesh.free_facets(problem)]
@@ -83,7 +83,7 @@ def overlaps(problem: MuscleProblem) -> dict[str, float]:
 
 def search_radius(problem: MuscleProblem, deep: float) -> float:
     """Depth [mm] inside a bone to which FEBio looks for contact, if the muscle penetrates the bone by ``deep`` [mm] at rest. It is
-    less if contact would immediately press with more than the matrix withstands.
+    smaller if contact would press at once with more than ``_AT_ONCE`` shear moduli of the matrix.
     """
     assert problem.contact is not None  # called only with contact
     softest = min(sum(matrix_constants(part.effects)[key] for key in ("c1", "c2")) for part in parts(problem))
@@ -128,6 +128,6 @@ def _overlapping(problem: MuscleProblem) -> Iterator[str]:
             assert problem.contact is not None  # as overlaps are only reported with contact
             yield (
                 f'bone "{bone}": facets of the tetrahedra are up to {deep:.2g} mm inside at rest. FEBio removes this overlap in '
-                f"its first step, the reference before. With a search_radius of {radius:.2g} mm, FEBio ignores contact at deeper "
-                f"points, whose pressure exceeds {problem.contact.stiffness * radius:.2g} MPa"
+                f"its first step, the reference before it starts. With a search_radius of {radius:.2g} mm, FEBio ignores contact "
+                f"at deeper points, whose pressure exceeds {problem.contact.stiffness * radius:.2g} MPa"
             )

@@ -27,7 +27,7 @@ EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 FACING = [0, 2, 1, 5, 4, 3]  # the nodes of a tri6 whose normal is reversed
 # Springs at points are small rigid triangles of this fraction of the points' tributary areas, by which their penalty is divided.
 SHRUNK = 0.01
-_LEAST_AREA = 1e-6  # a point with less than this fraction of the greatest area has no spring
+_LEAST_AREA = 1e-6  # a point with less than this fraction of the largest area has no spring
 _CLEAR = 0.005  # barycentric distance of these triangles from the edges of their facet, so that no ray misses it
 
 
@@ -82,7 +82,7 @@ def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
 
 
 def outward(surface: Surface) -> Surface:
-    """The surface with its normals pointing out of it."""
+    """The surface with outward normals."""
     turned = enclosed_volume(surface.points, surface.triangles) < 0
     return Surface(surface.points, surface.triangles[:, ::-1]) if turned else surface
 

@@ -29,9 +29,9 @@ SCALED: dict[type[Effect], tuple[str, ...]] = {
     FibrePassive: ("stress",),
     FibrePassiveFebio: ("c3", "c5"),
 }
-# Parameters in a part differ by at most FACTOR; fibre parameters below _LEAST times the greatest are treated as equal to that.
+# Parameters in a part differ by at most FACTOR; fibre parameters below _LEAST times the maximum count as this bound.
 FACTOR, _LEAST = 1.2, 0.01
-# Parameters of fibre effects; these effects end at the border of a region.
+# Parameters of fibre effects; their share may fall to 0 at the border of a region.
 _OF_FIBRES = ("stress", "c3", "c5")
 # The points of a quadrature of degree 2 in a tetrahedron, in barycentric coordinates.
 _NEAR, _FAR = (5 + 3 * 5**0.5) / 20, (5 - 5**0.5) / 20
@@ -104,7 +104,7 @@ def note(problem: MuscleProblem) -> list[str]:
     many = len(parts(problem))
     text = (
         f"regions are represented by {many} materials; in each, the parameters of the tetrahedra differ by at most a factor of "
-        f"{FACTOR:g} (fibre parameters below {100 * _LEAST:g} % of the greatest are not distinguished). A material has the mean of "
+        f"{FACTOR:g} (fibre parameters below {100 * _LEAST:g} % of the maximum are not distinguished). A material has the mean of "
         "these parameters, whereas in the reference they vary between quadrature points"
     )
     return [text] if many > 1 else []

@@ -18,7 +18,7 @@ _FIRST = ("Nodes", "Elements")  # the entries that come first in a mesh
 
 
 def model(problem: MusclesProblem) -> Element:
-    """The whole input file; all names of a muscle begin with the name of the muscle, as in ``deep_muscle``."""
+    """The complete input file; all names of a muscle begin with the name of the muscle, as in ``deep_muscle``."""
     root = Element("febio_spec", version="4.0")
     sections = {tag: Element(tag) for tag in _ORDER}
     before = dict.fromkeys(_NUMBERED.values(), 0)

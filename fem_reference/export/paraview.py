@@ -39,12 +39,12 @@ The reference was solved without `reference.store_state = true`, so the arrays t
 # Results that are evaluated from states; displacement is always written.
 _EVALUATED = ("det_F", "pressure", "fibre_stretch", "fibre_stress", "von_mises")
 _CORNERS = np.eye(4)
-# The statistic of the greatest distance to the reference, by the name of its error bar.
+# The statistic of the maximum distance to the reference, by the name of its error bar.
 _BARS = {"error_bar": "max", "error_bar_of_surface": "hausdorff"}
 
 
 def write(comparison: Comparison, folder: Path) -> list[str]:
-    """Write the runs of a muscle into ``folder``, completely or not at all; returns its file names. InputError if not free."""
+    """Write the runs of a muscle into a free ``folder``, completely or not at all, and return the file names; else InputError."""
     case = casefile.muscle(comparison.scene)
     with new_folder(folder) as part:
         frames = _Frames(comparison)

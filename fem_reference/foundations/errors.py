@@ -4,7 +4,7 @@ import errno
 
 # Error numbers of a full disk, an exhausted quota and a file that is too large.
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-# The greatest number of characters of a value that a message shows.
+# The maximum number of characters of a value that a message shows.
 _SHOWN = 400
 
 

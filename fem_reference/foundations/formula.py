@@ -14,7 +14,7 @@ from fem_reference.foundations.errors import InputError
 FUNCTIONS = ("sin", "cos", "exp", "sqrt", "tanh")
 COORDINATES = ("x", "y", "z")
 _WANT = f'a number, or a formula of x, y, z, pi, + - * / ** and {", ".join(FUNCTIONS)}, such as "sin(pi*x)"'
-_LONGEST = 1000  # characters, far fewer than would exhaust the recursion over its syntax tree
+_LONGEST = 1000  # the maximum number of characters, far fewer than exhaust the recursion over a syntax tree
 _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: lambda a, b: a + b,
     ast.Sub: lambda a, b: a - b,

@@ -13,7 +13,7 @@ from typing import Any
 @dataclass(frozen=True)
 class Indicator:
     """Indicator of an effect. ``estimate`` [mm]: the displacement of the surface due to the effect, root mean square at the worst
-    frame. ``stress`` [MPa]: the greatest stress due to it. ``number``: the value from which both follow, computed by the ``rule``.
+    frame. ``stress`` [MPa]: the maximum stress due to it. ``number``: the value from which both follow, computed by the ``rule``.
     """
 
     rule: str
@@ -24,7 +24,7 @@ class Indicator:
 
 @dataclass(frozen=True)
 class Near:
-    """Nearness of the free surface to a bone. ``gap`` [mm]: the clearance, guaranteed for any error of the guessed surface motion.
+    """Nearness of the free surface to a bone. ``gap`` [mm]: the guaranteed clearance, for any error of the estimated motion.
     ``depth`` [mm]: the possible penetration of the surface, rms at the worst frame. ``frame``: the first with the least gap.
     """
 
@@ -40,9 +40,9 @@ class Estimates:
     ``length``, ``thickness``: size of the muscle. ``shear``: its shear modulus at rest. ``tension`` [MPa]: tension of its fibres at
     rest length, the mean over the frames. ``fixed``: the number of bones to which it is attached. ``sag``: the distance of its axis
     from the straight line between two of these bones. ``lean``: the inclination of fibres to this line, from 0 to 1. ``travel``:
-    the greatest displacement of the surface due to the bones. ``stretch``: the least and the greatest stretch of the line between
+    the maximum displacement of the surface due to the bones. ``stretch``: the minimum and the maximum stretch of the line between
     the attachments, used as stretch of the fibres. ``interval``: the time between frame numbers, None if not stated. ``speed``,
-    ``sideways``, ``jump``, ``acceleration``: the greatest speed, sideways speed of the line, sudden change in velocity, and
+    ``sideways``, ``jump``, ``acceleration``: the maximum speed, sideways speed of the line, sudden change in velocity, and
     acceleration, per frame number. ``frames``: all frame numbers, and knots of ramps. ``tolerance`` [mm], ``stress_tolerance``
     [MPa]: an effect that changes less is not needed. ``near``: the nearness to each bone.
     """
@@ -68,8 +68,8 @@ class Estimates:
 
     def bend(self, force: float) -> float:
         """Displacement [mm], root mean square, of a Timoshenko beam with clamped ends under a ``force`` per volume [N/mm3]. Its
-        length, thickness and shear modulus are those of the muscle; its Young's modulus is three times its shear modulus. The mean
-        is 0.6 of the displacement in the middle, halved because bending also stretches. A free body is displaced by its length.
+        length, thickness and shear modulus are those of the muscle; its Young's modulus is three times its shear modulus. The rms
+        is 0.6 of the displacement in the middle, halved because bending also stretches. A free body counts as moved by its length.
         """
         if not self.fixed:
             return self.length
@@ -82,7 +82,7 @@ class Estimates:
         return pull / self.shear * (self.length / self.thickness) ** 2 / 12
 
     def draw(self, force: float) -> float:
-        """Shift [mm], root mean square, of a clamped bar along itself by a ``force`` per volume [N/mm3]: 2/3 of the maximum."""
+        """Shift [mm], root mean square, of a clamped bar along its axis by a ``force`` per volume [N/mm3]: 2/3 of the maximum."""
         return self.length**2 * force / (8 * 3 * self.shear) * 2 / 3 if self.fixed else self.length
 
     def lag(self, distance: float) -> float:
@@ -90,7 +90,7 @@ class Estimates:
         return distance / (1 + distance / self.travel) if self.travel else 0.0
 
     def greatest(self, effect: Any) -> float:
-        """The greatest amount of an ``effect`` over the frames."""
+        """The maximum amount of an ``effect`` over the frames."""
         return max(abs(float(effect.amount(frame))) for frame in self.frames)
 
     def straighten(self, pull: float) -> float:
@@ -102,7 +102,7 @@ class Estimates:
         return 0.6 * self.sag * self.taut(pull) / (1 + self.taut(pull)) + self.shorten(pull, 0.3) * self.lean
 
     def shorten(self, pull: float, share: float) -> float:
-        """Displacement [mm] of the surface, root mean square, by fibres that ``pull`` [MPa]: at most a ``share`` of the length."""
+        """Displacement [mm] of the surface, root mean square, by fibres that ``pull`` [MPa]: at most ``share`` times the length."""
         return share * self.length * pull / (pull + 3 * self.shear)
 
     def in_time(self, rate: float) -> float:

@@ -6,8 +6,8 @@ from typing import Literal
 
 from fem_reference.foundations.records import Record
 
-# The accepted difference of energy and work in a load step, as a share of the greatest energy so far. Above it the balance is
-# computed again with a state halfway; if a difference remains, the run is doubtful.
+# The accepted difference of energy and work in a load step, as a fraction of the maximum energy so far. Above it the balance is
+# computed again with a state halfway through the step; if a difference remains, the run is doubtful.
 ENERGY_GAP = 0.05
 
 # V/V0 is det F; the fibre stretch is the stretch in the energies, isochoric and with the prestretch.

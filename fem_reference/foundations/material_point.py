@@ -135,7 +135,7 @@ class FieldState:
 @dataclass(frozen=True)
 class Place:
     """A point at which a field effect acts: the ``position`` (x, y, z or the first of these), the ``functions`` of formulas, and
-    ``upper``, the share of the element above the mean y of the vertices.
+    ``upper``, the fraction of the element above the mean y of the vertices.
     """
 
     position: Sequence[Any]

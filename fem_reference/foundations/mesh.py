@@ -19,14 +19,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-# The greatest coordinate [mm] of a surface: a thousand kilometres.
+# The maximum coordinate [mm] of a surface: a thousand kilometres.
 FARTHEST = 1e9
 # Corners of the four triangles of a tet, each ordered so that its normal points out of a tet of positive volume.
 TET_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
 def read_only(values: Any, dtype: type) -> NDArray[Any]:
-    """A read-only copy of ``values``, or ``values`` that are such an array."""
+    """A read-only copy of ``values``, or ``values`` itself if it is a read-only array that owns its data."""
     kept = isinstance(values, np.ndarray) and values.flags.owndata and not values.flags.writeable
     array: NDArray[Any] = np.array(values, dtype=dtype, order="C", copy=None if kept else True)
     array.setflags(write=False)
@@ -164,7 +164,7 @@ def united(parts: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
 
 
 def check_finite(surface: Surface) -> None:
-    """InputError if there are no triangles, a point is not finite, or a triangle has a vertex that does not exist."""
+    """Raise InputError if there are no triangles, a point is not finite, or a triangle has a vertex that does not exist."""
     if len(surface.triangles) == 0:
         raise InputError(surface.place, "no triangles", "a triangle surface")
     bad = np.flatnonzero(~np.isfinite(surface.points).all(axis=1))
@@ -178,7 +178,7 @@ def check_finite(surface: Surface) -> None:
 
 
 def check_corners(surface: Surface) -> None:
-    """InputError if a triangle has a vertex that does not exist."""
+    """Raise InputError if a triangle has a vertex that does not exist."""
     if surface.triangles.min(initial=0) < 0 or surface.triangles.max(initial=-1) >= len(surface.points):
         want = f"vertices from 0 to {len(surface.points) - 1}"
         raise InputError(surface.place, "a triangle with a vertex that does not exist", want)
@@ -187,7 +187,7 @@ def check_corners(surface: Surface) -> None:
 def check_closed(surface: Surface) -> Surface:
     """The surface, outward, if it bounds one body: finite, closed, manifold and consistently oriented, with every point used.
 
-    InputError otherwise, with the number of wrong edges, vertices or parts, and the place of the first or the smallest.
+    InputError otherwise, with the number of wrong edges, vertices or parts, and the position of the first or the smallest.
     """
     check_finite(surface)
     points, triangles = surface.points, surface.triangles
@@ -213,7 +213,7 @@ def check_closed(surface: Surface) -> Surface:
 
 
 def twins(triangles: Ints) -> Ints:
-    """The two sides (e, 2) of each edge of a closed oriented surface; side 3 t + i leaves corner i of triangle t."""
+    """The two sides (e, 2) of each edge of a closed oriented surface; side 3 t + i starts at corner i of triangle t."""
     ends = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     return np.lexsort(ends.T).reshape(-1, 2)
 
@@ -227,13 +227,13 @@ def corner_fans(one: Ints, other: Ints, count: int) -> Ints:
 
 
 def connected_parts(first: Ints, second: Ints, count: int) -> Ints:
-    """The number (count,) of the connected part of each of ``count`` things; ``first`` (e,) are linked to ``second`` (e,)."""
+    """The number (count,) of the connected part of each of ``count`` nodes of a graph with edges ``first``, ``second`` (e,)."""
     links = coo_array((np.ones(len(first), bool), (first, second)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
 
 
 def _check_parts(surface: Surface) -> None:
-    """InputError if a closed oriented surface has a vertex with several fans of triangles, or several connected parts."""
+    """Raise InputError if a closed oriented surface has a vertex with several fans of triangles, or several connected parts."""
     one, other = twins(surface.triangles).T
     corners = surface.triangles.ravel()
     _, corner = np.unique(corner_fans(one, other, len(corners)), return_index=True)

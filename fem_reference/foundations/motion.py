@@ -15,7 +15,7 @@ class RigidMotion:
     """Rotation about the line through ``centre`` [mm] along ``axis`` by ``amounts`` [rad] at ``frames``, or, without a centre,
     sliding along the ``axis``, which may have any length, by ``amounts`` [mm]; linear in between.
 
-    Before the first keyframe and after the last one, the bone is at rest. Right-handed: a positive angle about +x takes +y to +z.
+    Before the first keyframe and after the last, the bone does not move. Right-handed: a positive angle about +x takes +y to +z.
     """
 
     axis: tuple[float, float, float]

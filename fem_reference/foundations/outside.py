@@ -19,7 +19,7 @@ def folders() -> list[str]:
 
 @cache
 def only_record(module: ModuleType, places: tuple[str, ...], kinds: tuple[type[Record], ...]) -> type[Record]:
-    """The one record of ``kinds`` that a ``module`` defines, whose file is in exactly one of the ``places``."""
+    """The only record of ``kinds`` in a ``module``; InputError if it has none or several, or its name is in several ``places``."""
     name = module.__name__.rpartition(".")[2]
     found = [place for place in places if (Path(place) / f"{name}.py").is_file()]
     if len(found) > 1:

@@ -25,7 +25,7 @@ class Record(BaseModel):
 
 
 def rule(holds: Callable[[Any], object], want: str) -> Any:
-    """A check of a record that is an error, with the text ``want``, unless it ``holds`` for the record."""
+    """A check of a record: an error with the text ``want`` unless ``holds`` is true for the record."""
 
     def check(record: Any) -> Any:
         if not holds(record):
@@ -36,7 +36,7 @@ def rule(holds: Callable[[Any], object], want: str) -> Any:
 
 
 def key_rule(key: str, holds: Callable[[Any, dict[str, Any]], object], want: str) -> Any:
-    """A check of a ``key`` of a record, as :func:`rule`; ``holds`` gets its value, and earlier values by their keys."""
+    """A check of a ``key`` of a record, like :func:`rule`; ``holds`` takes its value, and the earlier values by key."""
 
     def check(value: Any, info: Any) -> Any:
         if not holds(value, info.data):
@@ -100,7 +100,7 @@ def check_used(known: Sequence[str], uses: Sequence[tuple[str, str]], place: str
             raise InputError(join(place, key), f'"{name}"', want)
 
 
-_SHOWN = 12  # the greatest number of errors that are shown for a file
+_SHOWN = 12  # the maximum number of errors that are shown for a file
 _LONGEST_NAME = 100
 # A name in pages and messages.
 Name = Annotated[str, AfterValidator(check_name)]

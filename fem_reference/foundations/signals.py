@@ -6,15 +6,15 @@ import sys
 import threading
 from contextlib import suppress
 
-TERMINATED = 143  # the status that shells report
+TERMINATED = 143  # the status that shells report after SIGTERM
 _RAISED = {KeyboardInterrupt: signal.SIGINT, SystemExit: signal.SIGTERM}
 # The time [s] after which a signal whose exception was lost is repeated.
 _AGAIN = 0.05
 
 
 def listen() -> None:
-    """Let SIGTERM raise SystemExit, as SIGINT raises KeyboardInterrupt, so that running work is cleaned up. Python loses what is
-    raised in a callback or ``__del__`` that it happens to run: then the signal is repeated.
+    """Let SIGTERM raise SystemExit, as SIGINT raises KeyboardInterrupt, so that running work is cleaned up. If Python discards the
+    exception, as it does in a callback or ``__del__``, the signal is repeated.
     """
     before = sys.unraisablehook
 

@@ -130,14 +130,14 @@ def peak_memory(process: int | None = None) -> float:
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """A folder in the system's temporary folder, locked as long as this process lives."""
+    """A folder in the system's temporary folder, locked until it is removed or this process ends."""
     _clear(Path(tempfile.gettempdir()))
     with tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True) as name, FileLock(Path(name) / _LOCK):
         yield Path(name)
 
 
 def _clear(root: Path) -> None:
-    """Remove folders that killed processes left; folders that may not be removed stay."""
+    """Remove folders that killed processes left behind; folders that cannot be removed stay."""
     for path in root.glob(f"{_PREFIX}*"):
         with suppress(OSError, Timeout):
             if time.time() - path.stat().st_mtime > _SETTLED and (path / _LOCK).is_file():

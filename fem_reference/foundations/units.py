@@ -1,4 +1,4 @@
-"""Conversion of text with a unit to a number in mm, N, MPa, s, rad, tonne: only in this module a unit is text.
+"""Conversion of text with a unit to a number in mm, N, MPa, s, rad, tonne; no other module handles units as text.
 
 Scene records consist of the annotated types: a field of type ``Pressure`` takes ``"30 kPa"`` and stores 0.03.
 """
@@ -22,7 +22,7 @@ LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft"
 
 class Kind(NamedTuple):
     """A kind of quantity: its internal ``unit``, ``examples`` of one and of three values in a file, and the ``greatest`` accepted
-    magnitude, above any real value and without loss of digits. For a kind without a unit: the texts accepted instead of a unit.
+    magnitude, far above real values. ``written``: for a kind without a unit, the texts accepted instead of a unit.
     """
 
     unit: str
@@ -37,12 +37,12 @@ KINDS = TypeAdapter(dict[str, Kind]).validate_python(_FILE["kind"])
 COMMON: dict[tuple[str, str], float] = {
     (unit, inside): factor for inside, units in _FILE["common"].items() for unit, factor in units.items()
 }
-# A number, then possibly a unit.
 _ONE_BY_ONE = threading.Lock()
+# A number, then possibly a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
 # Forbidden in a unit: an exponent that is not an integer of one or two digits, or that has an exponent itself, as in mm^9^9^9.
 _NO_UNIT = re.compile(r"(?:\^|\*\*)(?!\s*[+-]?\d{1,2}(?![\w.])(?!\s*(?:\^|\*\*)))", re.ASCII)
-# The greatest number of characters in a quantity.
+# The maximum number of characters in a quantity.
 _LONGEST = 100
 # The smallest accepted quantity above zero, in its internal unit.
 _SMALLEST = 1e-30
@@ -52,13 +52,13 @@ _EXPONENT = re.compile(r"(?<=[A-Za-z])(?=[23](?!\w))")
 
 @cache
 def _registry() -> Any:
-    import pint  # imported here, as it takes 0.4 s, which processes with common units only save
+    import pint  # imported here, as it takes 0.4 s, which is saved if only common units occur
 
     return pint.UnitRegistry(cache_folder=None)
 
 
 def quantity(text: object, kind: str) -> float:
-    """Read ``text``, a number and then its unit, as a quantity of ``kind`` (``"a pressure"``); ValueError if it is not.
+    """Read ``text``, a number followed by its unit, as a quantity of ``kind`` (``"a pressure"``); ValueError if it is not.
 
     A fraction is in per cent or has no unit.
 

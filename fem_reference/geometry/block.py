@@ -13,7 +13,7 @@ from fem_reference.geometry.tetrahedra import check_size
 
 Counts = tuple[int, int, int]
 
-_SAME = 1e-6  # tolerance relative to the largest edge: the precision of single-precision coordinates
+_SAME = 1e-6  # tolerance relative to the largest edge: the rounding of single-precision coordinates
 
 
 def fill(surface: Surface, size: float) -> TetMesh:

@@ -15,7 +15,7 @@ def bounds(surface: Surface) -> tuple[Floats, Floats]:
 
 
 def within(surface: Surface, low: Floats, high: Floats) -> Ints:
-    """The triangles (k,) of a ``surface`` whose bounding boxes meet the box from ``low`` to ``high`` (3,) [mm]."""
+    """The triangles (k,) of a ``surface`` whose bounding boxes overlap the box from ``low`` to ``high`` (3,) [mm]."""
     corners = surface.points[surface.triangles]
     meets = (corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)
     return np.flatnonzero(meets.all(axis=1))

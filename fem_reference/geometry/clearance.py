@@ -24,7 +24,7 @@ class Clearance:
     spacing: float
 
     def __call__(self, points: Floats) -> Floats:
-        """A lower bound (n,) on the clearance [mm] of ``points`` (n, 3), at most 0 if none is certain; NaN if a coordinate is."""
+        """A lower bound (n,) on the clearance [mm] of ``points`` (n, 3), at most 0 if none is certain; NaN for NaN coordinates."""
         at = (points - self.origin) / self.spacing
         known = np.isfinite(at).all(axis=1)
         at = np.where(known[:, None], at, 0.0)
@@ -51,7 +51,7 @@ def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float
 
 def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
     """Mask of the cells, three fewer along each axis, in which a spline may be at ``level`` or below. In a cell, the least
-    of the 64 coefficients bounds the spline from below, and the least Bernstein coefficient does so more closely. The greatest
+    of the 64 coefficients bounds the spline from below, and the least Bernstein coefficient does so more closely. The largest
     coefficient bounds it from above, so cells deep inside need no check.
     """
     found = _least_of_four(coefficients) <= level

@@ -10,7 +10,7 @@ from fem_reference.geometry.edges import Edges
 
 # Chosen by trials on four hip muscles and a box; more rounds bring no improvement.
 _ROUNDS = 6
-# A vertex may move along a direction if that direction has less than this share of the squared normals around the vertex:
+# A vertex may move along a direction if that direction has less than this fraction of the squared normals around the vertex:
 # the vertex then stays on its plane or sharp edge. Above 0.05 a thin rim shrinks; below 0.02 slivers remain.
 _FREE = 0.03
 # Distance of the pole of inversion, in diagonals of the body: a nearer pole moves sharp edges, a farther one leaves parts flat.
@@ -70,7 +70,7 @@ def slide(points: Floats, triangles: Ints) -> Floats:
 
 
 def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> Floats:
-    """The part (k, 3) of displacements that stays on a surface: in a smooth place the tangential part, at a sharp edge the part
+    """The part (k, 3) of displacements that stays on a surface: at a smooth point the tangential part, at a sharp edge the part
     along the edge, at a corner 0. The surface has ``points`` (n, 3) [mm] and ``triangles`` (m, 3); its points ``chosen`` (k,) are
     displaced by ``steps`` (k, 3) [mm].
     """
@@ -115,7 +115,7 @@ def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> I
 
 
 def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
-    """The triangles after edge flips with a gain, the greatest first, each triangle at most once; the same array without flips."""
+    """The triangles after edge flips with a gain, the largest first, each triangle at most once; the same array without flips."""
     edges = Edges.of(Surface(points, triangles))
     gain = _flip_gain(points, edges)
     if labels is not None:
@@ -136,7 +136,7 @@ def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
 
 
 def _flip_gain(points: Floats, edges: Edges) -> Floats:
-    """The excess (e,) [rad] over pi of the sum of the angles opposite to each edge; 0 if a flip is not useful or bends it."""
+    """The excess (e,) [rad] over pi of the sum of the angles opposite to each edge; 0 if a flip is useless or bends the surface."""
     a, b, c, d = (points[corner] for corner in (*edges.ends.T, *edges.opposite.T))
     excess = _angle(a - c, b - c) + _angle(a - d, b - d) - np.pi
     before = _cosine(np.cross(b - a, c - a), np.cross(a - b, d - b))

@@ -1,6 +1,6 @@
 """Sections of a muscle on which a field has a given value (isosurfaces), as triangles, each mapped to the unit square.
 
-Rims of consecutive sections are matched point by point, so a changing outline does not turn lines along the muscle.
+Rims of consecutive sections are matched point by point, so a changing outline does not twist lines along the muscle.
 """
 
 from dataclasses import dataclass
@@ -11,17 +11,15 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, normals
 
-# A point whose value is this close to the level counts as above it, so that no triangle has two corners in one place.
+# A point whose value is this close to the level counts as above it, so that no triangle has two corners at one point.
 _NUDGE = 1e-4
-# The unit square's boundary, counter-clockwise from the middle of its side x = 1, by shares of its length.
+# The unit square's boundary, counter-clockwise from the middle of its side x = 1, by fractions of its length.
 _SHARES = (0, 1 / 8, 3 / 8, 5 / 8, 7 / 8, 1)
 _SQUARE = ((1, 1, 0, 0, 1, 1), (0.5, 1, 1, 0, 0, 0.5))
 _SAMPLES = 360  # the number of points on each rim that are matched
 _REACH = 60  # the number of samples by which a match may deviate from the common shift of the rim, either way
 _STEPS = (-1, 0, 1, 2, 3)  # numbers of samples by which consecutive matches may differ, so that matches stay in order
-_STIFFNESS = (
-    0.01  # share of a rim's length: the distance of points that costs as much as stretching a rim to twice its length
-)
+_STIFFNESS = 0.01  # fraction of a rim's length: the distance of points that is as costly as stretching the rim to twice its length
 _WINDOW = 9  # the number of samples in the moving mean that smooths the matches
 _LEAST = 0.1  # the weight of the common shift in a match, so that no two points coincide
 
@@ -56,7 +54,7 @@ class CrossSection:
         """The position (k,) of each point of the rim around the unit square, in turns from the middle of the square's side x = 1;
         ``first`` (3,) is the direction of its first side.
 
-        The position is a share of length after a stretch that makes width and height equal, so a rectangle is mapped linearly.
+        The position is a fraction of length after a stretch that makes width and height equal, so a rectangle is mapped linearly.
         """
         centre, product = self.moments
         axes = np.stack([first, np.cross(self.normal, first)])
@@ -70,7 +68,7 @@ class CrossSection:
 
 
 def _around(loop: Floats) -> Floats:
-    """Shares (k,) of the length of a counter-clockwise ``loop`` (k, 2), from its farthest crossing of the first axis."""
+    """Fractions (k,) of the length of a counter-clockwise ``loop`` (k, 2), from its farthest crossing of the first axis."""
     ahead = np.roll(loop, -1, axis=0)
     lengths = np.linalg.norm(ahead - loop, axis=1)
     rises = np.flatnonzero((loop[:, 1] < 0) & (ahead[:, 1] >= 0))
@@ -83,7 +81,7 @@ def _around(loop: Floats) -> Floats:
 
 def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection | None:
     """The largest piece of the section of a ``mesh`` on which the field of ``values`` (n,) at its points is ``level``; None if the
-    piece has holes or does not exist. Its normal points towards greater values.
+    piece has holes or does not exist. Its normal points towards larger values.
     """
     above = values - level
     above = np.where(np.abs(above) < _NUDGE, _NUDGE, above)
@@ -151,13 +149,13 @@ def carried(known: CrossSection, turns: Floats, other: CrossSection) -> Floats:
 
 
 def _shares(rim: Floats) -> Floats:
-    """The shares (k,) of the length of a closed ``rim`` (k, 3) from its first point to each."""
+    """The fractions (k,) of the length of a closed ``rim`` (k, 3) from its first point to each."""
     lengths = np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1)
     return np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / lengths.sum()
 
 
 def _at(places: Floats, shares: Floats, rim: Floats) -> Floats:
-    """Points (n, 3) on a closed ``rim`` (k, 3) at ``places`` (n,); these, and the ``shares`` (k,) of its points, are in turns."""
+    """Points (n, 3) on a closed ``rim`` (k, 3) at ``places`` (n,), in turns like the positions ``shares`` (k,) of its points."""
     return np.stack([np.interp(places, shares, axis, period=1) for axis in rim.T], axis=1)
 
 
@@ -167,7 +165,7 @@ def _continued(places: Floats, known: Floats, values: Floats) -> Floats:
 
 
 def _nearest(rim: Floats, shares: Floats, point: Floats) -> float:
-    """The position, as a share of its length, at which a closed ``rim`` (k, 3) is nearest to a ``point`` (3,)."""
+    """The position, as a fraction of its length, at which a closed ``rim`` (k, 3) is nearest to a ``point`` (3,)."""
     ahead = np.roll(rim, -1, axis=0) - rim
     squares = np.maximum((ahead**2).sum(axis=1), np.finfo(float).tiny)
     along = np.clip(((point - rim) * ahead).sum(axis=1) / squares, 0, 1)
@@ -176,7 +174,7 @@ def _nearest(rim: Floats, shares: Floats, point: Floats) -> float:
 
 
 def _matched(one: Floats, other: Floats) -> Floats:
-    """The share (n,) of the length by which each sample of the rim ``one`` (n, 3) is ahead of its match on the ``other`` rim."""
+    """The fraction (n,) of the length by which each sample of the rim ``one`` (n, 3) is ahead of its match on the ``other`` rim."""
     shift = int(np.argmin([((np.roll(one, -by, axis=0) - other) ** 2).sum() for by in range(len(one))]))
     reach = range(shift - _REACH, shift + _REACH + 1)
     apart = np.stack([((np.roll(one, -by, axis=0) - other) ** 2).sum(axis=1) for by in reach], axis=1)

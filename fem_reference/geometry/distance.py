@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal, normals
 from fem_reference.geometry.near_pairs import reached
 
-# The distance of a sample point just outside a triangle, as a share of the surface's diagonal.
+# The distance of a sample point just outside a triangle, as a fraction of the surface's diagonal.
 _STEP = 1e-5
 # The number of triangles within another part whose depth is measured: the triangles farthest from the uncovered triangles.
 _WITHIN = 16
@@ -116,7 +116,7 @@ def outer_windings(surface: Surface) -> Floats:
 
 
 def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
-    """A lower bound on the greatest depth [mm] of the centroids of the triangles ``some`` (m,) within another part of the closed
+    """A lower bound on the maximum depth [mm] of the centroids of the triangles ``some`` (m,) within another part of the closed
     ``surface``. The depth is the distance of a centroid to the nearest opposing triangle in front; 0 without self-intersection.
     """
     corners = surface.points[surface.triangles]

@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
 @dataclass(frozen=True, eq=False)
 class Edges:
     """The edges of a closed surface: ``ends`` (e, 2), in the direction of the left triangle seen from outside; ``beside`` (e, 2),
-    the left and the right triangle; ``opposite`` (e, 2), their third corners; ``areas`` (e,) [mm2], a third of both at rest.
+    the left and the right triangle; ``opposite`` (e, 2), their third corners; ``areas`` (e,) [mm2], a third of both areas.
     """
 
     ends: Ints

@@ -8,7 +8,7 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, diagonal, edge_vectors
 from fem_reference.geometry.distance import Distances, distances
 
-# A point that rounding leaves between two tets is searched again at this distance, as a share of the mesh's diagonal.
+# A point that rounding leaves between two tets is searched again at this distance, as a fraction of the mesh's diagonal.
 _NUDGE = 1e-9
 # A closest point with a barycentric coordinate below this counts as on the opposite edge, or at a corner.
 _TIE = 1e-9

@@ -15,7 +15,7 @@ from fem_reference.geometry.skins import Pieces, Skin, cut, embedded, points, sp
 
 # A part that faces more than 120 degrees away from an attached part is on the other side of a thin body.
 _SAME_SIDE = -0.5
-# Corners are sampled at this share of the way to the middle of their piece, so that a point on an edge belongs to one side.
+# Corners are sampled at this fraction of the way to the middle of their piece, so that a point on an edge belongs to one side.
 _INWARD = 1e-3
 
 
@@ -35,7 +35,7 @@ class Corners(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Exemption:
     """The part of a ``surface`` that is exempt from contact: the triangles of the attached ``part`` (r, 3, 3), and the surface
-    within ``reach`` [mm] of them on the same side. ``by`` (r,): the index of each triangle's attachment; ``names``: the bones.
+    within ``reach`` [mm] of them on the same side. ``by`` (r,): the index of each triangle's attachment; ``names``: their bones.
 
     The reach is the ``spacing`` of the contact points: the area of a point closer to the attached part would include attached
     area. The reach depends on the size of the surface and not on its triangles.

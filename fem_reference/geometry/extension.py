@@ -10,7 +10,7 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal
 from fem_reference.geometry.distance import distances
 
-# A point closer to the surface than this share of its diagonal counts as on it.
+# A point closer to the surface than this fraction of its diagonal counts as on it.
 _ON = 1e-10
 # If the sine of the angle between a triangle's plane and the line of sight is below this, its solid angle counts as 0.
 _EDGE_ON = 1e-10

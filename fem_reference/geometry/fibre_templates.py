@@ -20,7 +20,7 @@ from fem_reference.geometry.radial_basis import halton
 PLACE = "fibres.kohout_kukacka"
 _WINDOW = 7  # the number of points of a line through which smoothing fits a parabola
 _FLAT = 1e-9  # twice the area of a triangle in the unit square below which its corners count as collinear
-_SHORTEST = 0.1  # the least length of a pennate fibre, as a fraction of the longest fibre's extent along the muscle
+_SHORTEST = 0.1  # the minimum length of a pennate fibre, as a fraction of the longest fibre's extent along the muscle
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Contours:
         return float(np.mean([np.linalg.norm(np.diff(self._on(i, sides), axis=0)) for i in range(len(self.sections))]))
 
     def place(self, cube: Floats) -> Floats:
-        """Points (n, 3) [mm] for positions (n, 3) in the unit ``cube``, linear between sections and beyond the last."""
+        """Points (n, 3) [mm] for positions (n, 3) in the unit ``cube``, linear between sections and beyond both ends."""
         last = len(self.heights) - 2
         below = np.clip(np.searchsorted(self.heights, cube[:, 2], side="right") - 1, 0, last)
         found = np.empty_like(cube)

@@ -15,9 +15,9 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.nested import EDGES
 
-POINTS = 40  # on each line
+POINTS = 40  # the number of points on each line
 _NEAR = 1e-3  # a line has arrived where the field is this close to 0 or 1
-# Seeds whose scores differ by less than this share are ordered by their index, so that a rotated mesh gives the same lines.
+# Seeds whose scores differ by less than this fraction are ordered by their index, so that a rotated mesh gives the same lines.
 _TIES = 1e-6
 _HALFWAY = 0.5 - _TIES  # a field value of 1/2 up to rounding counts as above it
 
@@ -89,7 +89,7 @@ def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
 def trace(field: FibreField, count: int) -> Polylines:
     """``count`` lines of 40 points each along ``field``, from one attachment to the other.
 
-    The lines are spread over the section halfway; InputError if fewer can be traced.
+    The lines are spread over the section where the field is 1/2; InputError if fewer can be traced.
     """
     seeds = _seeds(field)
     if len(seeds) == 0:
@@ -160,7 +160,7 @@ def averaged(mesh: TetMesh, slopes: Floats) -> Floats:
 
 
 def _seeds(field: FibreField) -> Floats:
-    """Points (k, 3) where the field is 1/2, away from the skin: in each tet the middle of the cut and halfway to its corners."""
+    """Points (k, 3) where the field is 1/2, away from the skin: in each tet the middle of the cut, and halfway to its corners."""
     mesh = field.mesh
     ends = mesh.tets[:, EDGES]
     low, high = (field.values[ends[:, :, side]] - _HALFWAY for side in range(2))
@@ -187,7 +187,7 @@ def spread(points: Floats, count: int) -> Floats:
 
 
 def _first_best(scores: Floats) -> int:
-    """The first index whose score is the greatest up to rounding."""
+    """The first index whose score is the maximum up to rounding."""
     return int(np.argmax(scores >= scores.max() - _TIES * np.abs(scores).max()))
 
 

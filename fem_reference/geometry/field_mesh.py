@@ -64,7 +64,7 @@ FURTHEST = 1e50
 
 
 def check(mesh: FieldMesh) -> FieldMesh:
-    """``mesh`` itself; InputError for non-finite numbers, wrong indices, unused vertices, flat cells, edges of three triangles."""
+    """``mesh`` itself; InputError for non-finite numbers, wrong indices, unused vertices, flat cells, edges of 3 or more cells."""
     count = len(mesh.points)
     if not np.isfinite(mesh.points).all():
         raise InputError(mesh.place, "a coordinate that is not a finite number", "finite coordinates")
@@ -98,7 +98,7 @@ def share_above(mesh: FieldMesh, level: float) -> Floats:
     """The fraction (m,) of each triangle's area with y above ``level``."""
     heights = np.sort(mesh.points[mesh.cells][:, :, 1] - level, axis=1)
     low, middle, high = heights.T
-    # The corner alone on its side of the level is cut off; its share of the area is the product of the shares of its two edges.
+    # The corner alone on its side of the level is cut off; its fraction of the area is the product of its edges' fractions.
     with np.errstate(divide="ignore", invalid="ignore"):
         top = np.where(high > 0, high**2 / ((high - low) * (high - middle)), 0.0)
         bottom = np.where(low < 0, low**2 / ((high - low) * (middle - low)), 0.0)
@@ -107,7 +107,7 @@ def share_above(mesh: FieldMesh, level: float) -> Floats:
 
 
 def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: int) -> tuple[float, Floats]:
-    """The greatest Peclet number of all cells, and for each (m,) the upwinding parameter ``tau = h / 2|v| (coth Pe - 1 / Pe)``.
+    """The maximum Peclet number of all cells, and for each (m,) the upwinding parameter ``tau = h / 2|v| (coth Pe - 1 / Pe)``.
 
     ``Pe = |v| h / 2k``, with the ``diffusion`` k and the part v of the ``velocity`` (d,) along the cell (Brooks and Hughes 1982,
     doi 10.1016/0045-7825(82)90071-8). The distance h of nodes along v is ``2|v| / sum |v . grad lambda|`` divided by the ``order``

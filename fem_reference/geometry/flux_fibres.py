@@ -25,9 +25,9 @@ from fem_reference.foundations.mesh import (
 )
 from fem_reference.geometry.fibres import POINTS, FibreField, averaged, resample, spread
 
-MOST = 1000  # the greatest number of fibres
-_LINES, _LINES_EACH = 1000, 8  # the least number of lines in all, and per fibre; fibres are chosen among these lines
-_ROUNDS = 50  # the largest number of iterations of Lloyd's algorithm, which converges in fewer
+MOST = 1000  # the maximum number of fibres
+_LINES, _LINES_EACH = 1000, 8  # the minimum number of lines in all, and per fibre; fibres are chosen among these lines
+_ROUNDS = 50  # the maximum number of iterations of Lloyd's algorithm, which converges in fewer
 _PLASTIC = 1.324717957244746  # x^3 = x + 1: its powers spread points evenly (Roberts 2018, the R2 sequence)
 
 
@@ -81,7 +81,7 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
 def streamlines(flux: Flow, count: int) -> Polylines:
     """``count`` lines of 40 points along a ``flux``, each for an equal area of both attachments; InputError if fewer can be traced.
 
-    Many lines start evenly over the area; the lines kept are the middles of groups that are compact at both ends (Lloyd 1982),
+    Many lines start evenly over the area; the selected lines are the middles of groups that are compact at both ends (Lloyd 1982),
     measured in units of the size of each attachment.
     """
     if count > MOST:
@@ -107,7 +107,7 @@ def _numbers(triangles: Ints, facets: Ints) -> Ints:
 
 
 def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:
-    """``count`` places (n, 3) [mm], spread evenly over the area where the flow begins, and the tetrahedron (n,) of each."""
+    """``count`` points (n, 3) [mm], spread evenly over the area where the flow begins, and the tetrahedron (n,) of each."""
     mesh, facets = flux.mesh, flux.start
     shares = np.cumsum(triangle_areas(mesh.points, facets))
     facet = np.searchsorted(shares / shares[-1], (np.arange(count) + 1 / _PLASTIC) / count)  # never on a facet's rim

@@ -15,11 +15,11 @@ from fem_reference.geometry.distance import farthest_points
 _INSIDE, _SAMPLES = 20_000, 1500
 # The distance of samples on both sides of the surface, relative to the edge of a cube of the same volume.
 _BESIDE = 0.05
-# Rounds of the fit, each with the gradients of the level at the samples from the previous round, and evaluations in each round.
+# Rounds of the fit, each with the gradients of the level at the samples from the previous round, and evaluations per round.
 _ROUNDS, _STEPS = 6, 8
-# The least and the greatest radius, relative to the edge of a cube of the same volume.
+# The minimum and the maximum radius, relative to the edge of a cube of the same volume.
 _RADII = (0.02, 2.0)
-# The largest number of Newton steps, and the tolerance: the longest step divided by the least radius.
+# The maximum number of Newton steps, and the tolerance: the longest step divided by the least radius.
 _PROJECTIONS, _THERE = 12, 1e-9
 
 
@@ -69,7 +69,7 @@ def _fit(surface: Surface, count: int) -> GaussianSurface:
     """The fit to a ``surface`` of volume 1 whose principal axes are the coordinate axes."""
     bounds, inside = np.log(_RADII), _inside(surface)
     if not 2 <= count <= len(inside):
-        raise InputError("gaussians", count, f"2 to {len(inside)}, as many as the points inside that they begin from")
+        raise InputError("gaussians", count, f"2 to {len(inside)}, the number of points inside the surface")
     centres, found = scipy.cluster.vq.kmeans2(inside, inside[farthest_points(inside, count)], minit="matrix")
     squares = np.bincount(found, ((inside - centres[found]) ** 2).sum(axis=1), count)
     spread = np.maximum(squares / np.maximum(np.bincount(found, minlength=count), 1), 1.01 * np.exp(2 * bounds[0]))

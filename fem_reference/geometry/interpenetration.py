@@ -11,7 +11,7 @@ _GRID = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 
 
 
 def penetration(one: Surface, other: Surface) -> tuple[float, Floats]:
-    """The depth [mm] to which two closed surfaces penetrate each other, 0 if they are apart, and its place (3,). It is the greatest
+    """The depth [mm] to which two closed surfaces penetrate each other, 0 if they are apart, and its place (3,). It is the maximum
     over all vertices, and over 28 sample points on each triangle that crosses the other surface.
     """
     pairs = crossings(one, other)

@@ -50,7 +50,7 @@ def crossings(one: Surface, other: Surface) -> Ints:
 
 def overlaps(one: Floats, other: Floats) -> Floats:
     """Penetration (k,) [mm] of triangles ``one`` and ``other`` (k, 3, 3) that cross: the shortest displacement along the normal of
-    either that moves the other to one side of its plane; 0 if either has no area.
+    either that moves the other triangle to one side of the plane; 0 if either has no area.
     """
     return np.asarray(np.nan_to_num([_reach(one, other), _reach(other, one)]).min(axis=0))
 

@@ -24,8 +24,8 @@ def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, F
     """The tetrahedra that ``mesher`` makes from a surface, ``size`` [mm] and ``shares``, as in
     :func:`fem_reference.geometry.tetrahedra.tetrahedralise`.
 
-    They are stored in ``folder``, if any, under a hash of everything on which they depend, including this package and the packages
-    that it imports.
+    They are stored in ``folder``, if any, under a hash of everything on which they depend, including the code of this package and
+    the versions of packages that make meshes.
     """
     if folder is None:
         return mesher(surface, size, shares)

@@ -1,6 +1,6 @@
 /* Triangles in a grid of cells: pairs that may intersect or touch, all that do and few that do not; triangles near points; parts.
 
-   A regular grid finds boxes that meet. A pair is left out only if a plane certainly separates its triangles, or if they share an
+   A regular grid finds overlapping boxes. A pair is left out only if a plane certainly separates its triangles, or if they share an
    edge. Only differences of coordinates are used, with relative rounding errors: SURE is thousands of these.
 */
 
@@ -57,7 +57,7 @@ static void widen(Box *box, const Box *other)
     }
 }
 
-/* The cell of a coordinate rises with it, so that two boxes that touch share the cell of their greatest low corner. */
+/* Cell numbers increase with coordinates, so that two boxes that touch share the cell of the greater of their low corners. */
 static void place(const Grid *grid, Box *box)
 {
     double share = 1 / grid->edge;
@@ -92,7 +92,7 @@ static void cross(const double *a, const double *b, double *found)
         found[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
-/* Whether all of a is certainly above all of b along a normal, or below; within bounds the error of heights. */
+/* 1 if all of a is certainly above or below all of b along a normal, else 0; within: a bound on the error of heights. */
 static int separates(const double *normal, double (*a)[3], double (*b)[3], double within)
 {
     double lows[2] = {INFINITY, INFINITY}, highs[2] = {-INFINITY, -INFINITY};
@@ -118,7 +118,7 @@ static int side(const double *normal, double (*points)[3], int count, double wit
     return (above == count) - (below == count);
 }
 
-/* Two triangles with one corner in common, the origin: whether a plane through it certainly separates their other corners. */
+/* Two triangles with one corner in common, the origin: 1 if a plane through it certainly separates their other corners, else 0. */
 static int parted_at_corner(double (*a)[3], double (*b)[3], double size)
 {
     double normal[3], across[3], up[2], down[2], within = SURE * size * size;
@@ -164,14 +164,14 @@ static int parted(double (*a)[3], double (*b)[3], double size)
     return 0;
 }
 
-/* Whether triangles s and t may meet elsewhere than at a common corner; point indices are compared if both are of one surface. The
-   sizes of their boxes, which touch, add up to size. */
+/* 1 if triangles s and t may meet elsewhere than at a common corner, else 0; point indices are compared if both are of one surface.
+   The sizes of their boxes, which touch, add up to size. */
 static int may_meet(const Surface *one, int64_t s, const Surface *other, int64_t t, double size)
 {
     const int64_t *names = one->corners + 3 * s, *others = other->corners + 3 * t;
     int shared = 0, mine = 0, its = 0;
     for (int i = 0; i < 3 && one->points == other->points; i++)
-        for (int j = 0; j < 3; j++) { /* no branches, which would be guessed wrongly */
+        for (int j = 0; j < 3; j++) { /* no branches, which would be mispredicted */
             int same = names[i] == others[j];
             shared += same;
             mine += same * i;
@@ -242,7 +242,7 @@ Grid *sorted(Surface surface)
     return NULL;
 }
 
-/* Whether boxes meet, and the cell is that of the greater of their low corners, so that each pair is met once; no branches. */
+/* 1 if boxes overlap and the cell is that of the greater of their low corners, which finds each pair once; no branches. */
 static int meet_in(const int *cell, const Box *one, const Box *other)
 {
     int found = 1;
@@ -289,7 +289,7 @@ static void add_of_one(Found *found, const Grid *grid)
         }
 }
 
-/* Whether a triangle is on one side of a box along an axis. */
+/* 1 if a triangle is on one side of a box along an axis, else 0. */
 static int beyond(const Surface *s, int64_t t, const Box *box)
 {
     const double *p[3];
@@ -340,7 +340,7 @@ static int meets_any(const Grid *grid, const Box *box)
     return 0;
 }
 
-/* Fill found with the triangles of a surface whose boxes meet one in the grid; the result is their number. */
+/* Fill found with the triangles of a surface whose boxes overlap one in the grid; the result is their number. */
 int64_t reached(Surface surface, const Grid *grid, int64_t *found)
 {
     int64_t count = 0;

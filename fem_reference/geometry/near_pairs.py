@@ -65,7 +65,7 @@ def near_pairs(one: Surface, other: Surface) -> Ints | None:
 
 def reached(surface: Surface, points: Floats, reach: Floats) -> Ints:
     """The triangles (k,) whose bounding boxes come within ``reach`` (n,) [mm] of one of ``points`` (n, 3) along each axis: all that
-    do, and some others without a compiler, or if a place is not finite or very far.
+    do, and some others without a compiler, or if a point is not finite or very far.
     """
     if not len(points):
         return np.zeros(0, np.int64)
@@ -86,8 +86,8 @@ def _moderate(*places: Floats) -> bool:
 
 @lru_cache(maxsize=16)
 def parts_of(surface: Surface) -> tuple[Ints, Ints]:
-    """The first vertices (k,) of the connected parts of a ``surface``, and that of the part of each vertex (n,), up to the last
-    vertex of a triangle; ValueError if a vertex number is negative.
+    """The first vertex of each connected part (k,) of a ``surface``, and for each vertex (n,) the first vertex of its part; n - 1
+    is the last vertex of a triangle. ValueError if a vertex number is negative.
     """
     if surface.triangles.min(initial=0) < 0:
         raise ValueError("a triangle has a negative vertex number")

@@ -35,7 +35,7 @@ _FACE_PARTS = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2], [3, 5, 4]])
 # then divides the error due to the rim by four: the order is 2 instead of 1 (Bacuta, Nistor and Zikatanov 2005, doi
 # 10.1007/s00211-005-0588-3); where the solution is smooth, quadratic elements converge faster.
 GRADED = 0.25
-# A point moves towards the surface as long as the tets around it keep these shares of their volume and of their quality.
+# A point moves towards the surface only as far as the tets around it keep these fractions of their volume and of their quality.
 _KEPT_VOLUME, _KEPT_QUALITY = 0.3, 0.5
 _ROUNDS, _SHORTER = 12, 0.6
 

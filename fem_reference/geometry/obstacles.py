@@ -8,13 +8,13 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints
 
-# A point this close to the middle of an obstacle, as a share of its size, is pushed out in an arbitrary direction.
+# A point this close to the middle of an obstacle, as a fraction of its size, is pushed out in an arbitrary direction.
 _MIDDLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """Places (n, 3) [mm] where n paths meet and leave the ``obstacles`` (n,), and unit vectors (n, 3) along the paths there."""
+    """Contacts of n paths with ``obstacles`` (n,): end points ``met``, ``left`` (n, 3) [mm], and tangents ``into``, ``out``."""
 
     obstacles: Ints
     met: Floats
@@ -49,7 +49,7 @@ class Quadric:
         return np.vecdot(own, own) - 1, 2 * (own / self.radii) @ self.pose[:3, :3].T
 
     def bending(self, _: Floats, directions: Floats) -> Floats:
-        """The second derivative (n,) of the level along ``directions`` (n, 3), the same everywhere."""
+        """The second derivative (n,) of the level along ``directions`` (n, 3), the same at all points."""
         own = directions @ self.pose[:3, :3] / self.radii
         return np.asarray(2 * np.vecdot(own, own))
 
@@ -78,7 +78,7 @@ class Quadric:
         return np.asarray(moved)
 
     def deepest(self, begins: Floats, ends: Floats) -> Floats:
-        """The positions on segments from ``begins`` to ``ends`` (..., 3), as shares of the length, at which the level is least."""
+        """The positions on segments from ``begins`` to ``ends`` (..., 3), as fractions of the length, with the least level."""
         one, other = self._own(begins) / self.radii, self._own(ends) / self.radii
         along = other - one
         return np.asarray(np.clip(-np.vecdot(one, along) / np.maximum(np.vecdot(along, along), 1e-300), 0, 1))

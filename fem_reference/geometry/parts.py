@@ -12,9 +12,9 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.edges import Edges
 
 _ROUNDS = 4  # The number of rounds of collapses, flips and slides.
-_SHORT = 0.4  # Edges at a rim that are shorter than this share of a triangle's size are collapsed.
-_STRAIGHT = np.cos(np.radians(50))  # A rim that turns by more than this at a point has a corner there.
-_SAME_SIDE = 0.5  # The least cosine between the normals of a triangle before and after a collapse.
+_SHORT = 0.4  # Edges at a rim that are shorter than this fraction of a triangle's size are collapsed.
+_STRAIGHT = np.cos(np.radians(50))  # A rim that turns by more than 50 degrees at a point has a corner there.
+_SAME_SIDE = 0.5  # The minimum cosine between the normals of a triangle before and after a collapse.
 _TINY = np.finfo(float).tiny
 
 
@@ -144,7 +144,7 @@ def _flatness(points: Floats, triangles: Ints) -> Floats:
 
 def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Floats:
     """The points (n, 3) [mm] moved so that the parts have given ``areas`` [mm2], from label 1 on, and enclose a ``volume`` [mm3].
-    Before the move both are too small, like a polygon inscribed in a circle. In each round the whole rim of a part moves outwards
+    Before the move both are too small, like a polygon inscribed in a circle. In each round the entire rim of a part moves outwards
     by the same distance, at most ``most`` [mm], and then all points move along their normals.
     """
     for _ in range(_ROUNDS):

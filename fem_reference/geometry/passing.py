@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from fem_reference.foundations.mesh import Floats, normals
 
 _SHARES = np.arange(4) / 3
-# Maps from the values of a cubic at these shares to its coefficients, and to its Bernstein coefficients, which bound it.
+# Maps from the values of a cubic at these fractions to its coefficients, and to its Bernstein coefficients, which bound it.
 _CUBIC = np.linalg.inv(np.vander(_SHARES, 4))
 _BERNSTEIN = np.linalg.inv(
     np.stack([(1, 3, 3, 1)[i] * _SHARES**i * (1 - _SHARES) ** (3 - i) for i in range(4)], axis=1)
@@ -17,7 +17,7 @@ def passed(starts: Floats, ends: Floats, before: Floats, after: Floats) -> NDArr
     """Mask (n,) of points that pass through the triangle in the same row from its front to its back. The points move straight from
     ``starts`` to ``ends`` (n, 3), and the corners of the triangles from ``before`` to ``after`` (n, 3, 3).
 
-    The volume of the tetrahedron between point and triangle is a cubic function of the share of the path (Provot 1997, Collision
+    The volume of the tetrahedron between point and triangle is a cubic function of the fraction of the path (Provot 1997, Collision
     and self-collision handling in cloth model dedicated to design garments); where it is 0, the point is in the plane.
     """
 

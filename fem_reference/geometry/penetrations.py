@@ -18,7 +18,7 @@ from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.skins import edge_lengths, quartered
 
 _NORMALS = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-_RINGS = 4  # of triangles that are searched one by one; further ones at once, by the connected parts of the surface
+_RINGS = 4  # rings of triangles that are searched one by one; the rest is searched at once, by connected parts
 # The number of points whose winding numbers take as long as building a search tree.
 _FEW = 20
 # A factor on distances that covers their rounding.
@@ -30,9 +30,9 @@ _CORNERS = _GRID.argmax(axis=0)
 _FIRST_EDGE, _FIRST_CUBES = 10.0, 20
 # The volume is not computed if the box around the surface has more first cubes than this (a cubic metre or more).
 _TOO_MANY = 1e6
-# The number of rounds of subdivision, the largest number of cubes after each, and of points drawn in them.
+# The number of rounds of subdivision, the maximum number of cubes after each, and of points drawn in them.
 _ROUNDS, _MOST = 3, 8000
-# The most times that a triangle is cut into four for sampling: its parts then have edges an eighth as long.
+# The maximum number of times that a triangle is cut into four for sampling: its parts then have edges an eighth as long.
 _PARTINGS = 3
 
 Distance = Callable[[Floats], Floats]
@@ -50,7 +50,7 @@ class Depths:
     places: Floats
 
     def deepest(self, rest: "Depths | None" = None) -> tuple[float, Floats]:
-        """The greatest depth [mm] in excess of the depth at ``rest``, and its place (3,) [mm]."""
+        """The maximum depth [mm] in excess of the depth at ``rest``, and its place (3,) [mm]."""
         beyond = self.values.copy()
         if rest is not None:
             _, here, there = np.intersect1d(self.at, rest.at, assume_unique=True, return_indices=True)
@@ -162,7 +162,7 @@ def _flood(deep: NDArray[np.bool_], triangles: Ints, crossing: Ints) -> None:
 
 
 def _tips(surface: Surface, crossing: Ints) -> Ints:
-    """A vertex of each part of a surface without triangles ``crossing`` another surface: the whole part is on its side."""
+    """A vertex of each connected part of a surface that has no triangles ``crossing`` another surface and so is on one side."""
     firsts, own = parts_of(surface)
     crossed = np.zeros(len(own), bool)
     crossed[own[surface.triangles[crossing, 0]]] = True
@@ -181,11 +181,11 @@ def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: 
 
     Space is cut into cubes, and cubes that may contain a part of the overlap are cut into smaller cubes. In these, 4000 to 8000
     random points are drawn, the same every time. The estimate is unbiased. Its standard deviation is at most half the volume of
-    one point, times the square root of the number of points in cubes on the border of the overlap.
+    a point, times the square root of the number of points in cubes on the border of the overlap.
 
     A point counts if its nearest triangle is in the mask ``counts`` (m,). The rigid body is given by the ``distance`` (n,) [mm] of
     points (n, 3) to it, negative inside; ``gaps`` are the distances of the surface's points. If all points ``body`` (k, 3) [mm],
-    on all sides of the rigid body, are inside the surface, the whole body counts. The volume is 0 if no counted triangle enters
+    on all sides of the rigid body, are inside the surface, the entire body counts. The volume is 0 if no counted triangle enters
     the body and the middle of the body is outside the surface. It is NaN if the surface has grown beyond a cubic metre.
     """
     extent = np.ptp(surface.points, axis=0)

@@ -1,4 +1,4 @@
-"""Sums of Gaussians for scattered values, with centres by grid, Halton, greedy search or features (report 3.5)."""
+"""Sums of Gaussians for scattered values, with centres from a grid, Halton's sequence, greedy search or features (report 3.5)."""
 
 from dataclasses import dataclass
 
@@ -88,7 +88,7 @@ def greedy_centres(points: Floats, values: Floats, count: int, shape: float, *, 
 
 def feature_centres(points: Floats, values: Floats, count: int, *, neighbours: int = 6) -> Floats:
     """``count`` of the ``points`` (n, d): local maxima and minima of ``values`` (n,) among their neighbours first, then points
-    where the values bend most, as in the report (3.5.1).
+    whose values differ most from the mean of their neighbours, as in the report (3.5.1).
     """
     _, near = cKDTree(points).query(points, k=min(neighbours + 1, len(points)))
     around = values[near[:, 1:]]

@@ -35,10 +35,10 @@ class Obstacle(Protocol):
 
     @property
     def half_thickness(self) -> float:
-        """The greatest depth [mm] inside the body."""
+        """The maximum depth [mm] inside the body."""
 
     def clearance(self, within: float) -> Callable[[Floats], Floats]:
-        """A lower bound (n,) [mm], for points (n, 3), on the length of a path to a place at most ``within`` [mm] from the body."""
+        """A lower bound (n,) [mm], for points (n, 3), on the length of a path to a point at most ``within`` [mm] from the body."""
 
     def sample(self, points: Floats) -> Sampled:
         """Distance and its two derivatives at ``points`` (n, 3) [mm], in the body's rest pose; NaN where a coordinate is NaN."""

@@ -21,17 +21,17 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.parts import Parts, between, relaxed, widened
 from fem_reference.geometry.sectors import attached_area, sectors, shares_at
 
-# These numbers were chosen by trials on hip muscles. The smoothing length of the shares, in triangle sizes; more rounds corners.
+# These numbers were chosen by trials on hip muscles. The smoothing length of the shares, in triangle sizes (more rounds corners).
 _SMOOTHED = 0.1
-# A vertex closer to a crossing than this share of the edge moves to it. Above 0.35 triangles degenerate; below 0.25 slivers remain.
+# A vertex within this fraction of the edge from a crossing moves to it. Above 0.35 triangles degenerate; below 0.25 slivers remain.
 _NEAR = 0.3
-# A fixed vertex closer to a crossing than this share of the edge counts as on the rim.
+# A fixed vertex closer to a crossing than this fraction of the edge counts as on the rim.
 _THERE = 0.2
-# An edge across a piece of an attachment, or across a gap in it, is cut if the piece or gap is wider than this share of the edge.
+# An edge across a piece of an attachment, or across a gap in it, is cut if it lies in the piece or gap by more than this fraction.
 _NARROW = 0.3
 _REFINED = 2  # number of rounds of the search for narrow pieces and gaps
-_ISLAND = 0.1  # the least area of an island of an attachment that is kept, in squares of the triangle size
-_WIDENED = 0.1  # the most that a rim moves outwards in each round, in triangle sizes
+_ISLAND = 0.1  # the minimum area of an island of an attachment that is kept, in squares of the triangle size
+_WIDENED = 0.1  # the maximum outward movement of a rim in each round, in triangle sizes
 _SAMPLES = 17  # number of samples of the shares along an edge
 _TRIALS = 10  # number of trials of the level, to match the area
 
@@ -180,7 +180,7 @@ class _Edges:
 
 @dataclass(frozen=True, eq=False)
 class _Crossings:
-    """The places at which ``edges`` first and last cross a level: at ``fractions`` (e, 2) of their length, NaN without a
+    """The points at which ``edges`` first and last cross a level: at ``fractions`` (e, 2) of their length, NaN without a
     crossing; ``signs`` (n,) of the points, and the mask ``within`` (m,) of the middles of triangles.
     """
 

@@ -5,7 +5,7 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, corner_fans, triangle_areas, twins, unit_normals
 from fem_reference.geometry.distance import distances
 
-# Two triangles meet in a sharp edge if the angle between their normals is greater than this.
+# Two triangles meet in a sharp edge if the angle between their normals exceeds 45 degrees.
 _SHARP = np.cos(np.radians(45))
 
 

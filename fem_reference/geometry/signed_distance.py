@@ -32,7 +32,7 @@ from fem_reference.geometry.rigid_bodies import Sampled, Vector
 
 # The distance [mm] returned outside a grid: far from everything, but finite.
 FAR = 1e6
-# The largest number of nodes of a grid that ``resolve`` refines: 256 cubed, 134 MB.
+# The maximum number of nodes of a grid that ``resolve`` refines: 256 cubed, 134 MB.
 MOST_NODES = 2**24
 # The first grid of ``resolve`` has about this many cells along its longest edge.
 _FIRST_CELLS = 24
@@ -43,7 +43,7 @@ _STRIDE = 4
 # The number of random points on and around the surface at which the error is sampled.
 _PROBES = 30_000
 _CHUNK = 1_000_000
-# The number of points sampled at a time.
+# The number of points evaluated at a time.
 _AT_ONCE = 10_000
 # The polynomial coefficients for powers 0 to 3 (columns) of the four cubic B-splines that reach into a cell (rows).
 _SPLINES = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6
@@ -57,7 +57,7 @@ class Grid:
 
     ``coefficients`` (i, j, k) [mm] of the B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``. The distance
     is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and ``FAR`` outside the grid.
-    ``error`` [mm] is the largest difference found from the exact distance within one spacing of the surface, and
+    ``error`` [mm] is the largest sampled difference from the exact distance within one spacing of the surface, and
     ``mean_error`` [mm] the root mean square, not the mean, of the differences there. Farther away, the ridges between two close
     parts of the surface are rounded like edges, by a third of a spacing. The gradient is that of the spline: its length is 1 within
     a few per cent, except on edges.
@@ -81,12 +81,12 @@ class Grid:
 
     @cached_property
     def half_thickness(self) -> float:
-        """A bound on the greatest depth [mm], from the least coefficient; infinite if the nodes are too far apart for a bound."""
+        """A bound on the maximum depth [mm], from the least coefficient; infinite if the nodes are too far apart for a bound."""
         deepest = float(-self.coefficients.min())
         return deepest if deepest > self.spacing else np.inf
 
     def clearance(self, within: float) -> Clearance:
-        """A lower bound on the length of paths from points to a place whose distance is at most ``within`` [mm]."""
+        """A lower bound on the length of paths from given points to any point whose distance is at most ``within`` [mm]."""
         return of_spline(self.coefficients, np.asarray(self.origin), self.spacing, within)
 
     def sample(self, points: Floats) -> Sampled:

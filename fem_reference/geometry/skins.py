@@ -20,7 +20,7 @@ _QUARTERS = np.array(
     ]
 ) / 2  # fmt: skip
 _RULE = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
-# The least number of points along the diagonal of a surface: on hip muscles the points are 3 mm apart.
+# The minimum number of points along the diagonal of a surface: on hip muscles the points are 3 mm apart.
 _ACROSS = 80
 
 
@@ -36,7 +36,7 @@ class Skin:
 
 
 def spacing(surface: Surface) -> float:
-    """The greatest allowed average distance [mm] of points on a ``surface``, independent of its mesh."""
+    """The maximum average distance [mm] of points on a ``surface``, independent of its mesh."""
     return diagonal(surface.points) / _ACROSS
 
 

@@ -11,7 +11,7 @@ from fem_reference.geometry.curves import catmull_rom, knots
 from fem_reference.geometry.fibres import POINTS, resample
 
 _THIN = 1e-6  # the squared ratio of a section's thickness to its width below which its lines count as on one surface
-_GOLDEN = np.pi * (3 - np.sqrt(5))  # the golden angle, from seed to seed of a sunflower [rad]
+_GOLDEN = np.pi * (3 - np.sqrt(5))  # the golden angle [rad], as between consecutive seeds of a sunflower
 
 
 def between(heads: Sequence[Polylines], count: int) -> Polylines:

@@ -13,7 +13,7 @@ Flags = NDArray[np.bool_]
 
 # Numbers of pieces of a string and of sweeps over it, and their overrelaxation: 1 moves a point to the middle of its neighbours.
 _PIECES, _SWEEPS, _BEYOND = 48, 120, 1.8
-# The largest number of points of a string; for a very thin tube more would be needed, so that no piece slips past the tube.
+# The maximum number of points of a string; around a very thin tube, more would be needed so that no piece slips past it.
 MOST = 10_000
 
 
@@ -52,7 +52,7 @@ def halved(string: Floats) -> Floats:
 
 
 def touching(obstacle: SmoothSurface, string: Floats) -> Flags:
-    """Mask (n, N) of the points of strings that may touch an obstacle: closer to it than a tangent after a quarter of a piece."""
+    """Mask (n, N) of the points of strings that may touch an obstacle: nearer to it than its tangent a third of a piece away."""
     value, slope = obstacle.level(string.reshape(-1, 3))
     away = (value / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)).reshape(string.shape[:2])
     piece = np.linalg.norm(np.diff(string, axis=1), axis=2).max(axis=1) * 2

@@ -41,7 +41,7 @@ _VOLUME_WITHIN = (
 )
 _MOST_TETS = 3e6  # a mesh that takes some GB and some minutes, and is far too large for a solver
 _MAKERS = {"gmsh": "gmsh", "tetwild": "fTetWild"}
-_SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # shares of the requested number of triangles, tried in turn
+_SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # factors on the requested number of triangles, tried in turn
 
 
 def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] | None = None) -> TetMesh:

@@ -16,7 +16,7 @@ from fem_reference.geometry.taut_strings import MOST, Flags, halved, longest, me
 
 # Steps of a geodesic; the error at its end is about (length / radius)^5 / (120 _STEPS^4) of the radius, 1e-7 for half a turn.
 _STEPS = 60
-# The limit on Newton iterations, their tolerance [share of the distance between the ends], and the finite-difference step.
+# The limit on Newton iterations, their tolerance [fraction of the distance between the ends], and the finite-difference step.
 _ITERATIONS, _SMALL, _STEP = 40, 1e-11, 1e-6
 # Number of points at which a path is checked for crossing an obstacle, besides the deepest points of its chords.
 _CHECKED = 200
@@ -82,7 +82,7 @@ class Winding:
         return found
 
     def at(self, which: Ints, shares: Floats) -> Floats:
-        """The points (m, 3) of paths ``which`` (m,) after ``shares`` (m,) of their lengths, by cubics between knots."""
+        """The points (m, 3) of paths ``which`` (m,) at the fractions ``shares`` (m,) of their lengths, by cubics between knots."""
         wanted = shares * self.lengths[which]
         low = np.clip((self.arcs[which] <= wanted[:, None]).sum(axis=1) - 1, 0, self.arcs.shape[1] - 2)
         span = self.arcs[which, low + 1] - self.arcs[which, low]
@@ -129,7 +129,7 @@ class _Pieces:
         return _Pieces(self.obstacles, self.starts[which], self.ends[which], *parts)
 
     def pressed(self) -> Flags:
-        """Mask (m, n): tension presses the path onto the obstacle, as the surface is convex along the middle of the geodesic."""
+        """Mask (m, n), True where tension presses the path onto the obstacle: the surface is convex along the geodesic's middle."""
         middles = [(points[_STEPS // 2], tangents[_STEPS // 2]) for points, tangents in self.run()]
         return np.array([one.bending(*at) > 0 for one, at in zip(self.obstacles, middles, strict=True)])
 
@@ -190,7 +190,7 @@ def _wrong(obstacles: Sequence[SmoothSurface], found: Winding, string: Floats) -
 
 
 def _deepest(obstacle: Quadric, found: Winding) -> Floats:
-    """The shares (n,) of the paths' lengths at which their chords are deepest in an obstacle, even a small one."""
+    """The fractions (n,) of the paths' lengths at which their chords are deepest in an obstacle, even a small one."""
     begins, ends = found.knots[:, :-1], found.knots[:, 1:]
     at = obstacle.deepest(begins, ends)
     values = obstacle.level((begins + at[:, :, None] * (ends - begins)).reshape(-1, 3))[0].reshape(at.shape)
@@ -216,7 +216,7 @@ def _guess(met: list[tuple[int, SmoothSurface]], string: Floats) -> _Pieces:
 
 
 def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
-    """The geodesics for which Newton's method removes the kinks, and a mask (n,), True if it succeeds."""
+    """The geodesics after Newton's method has removed the kinks, and a mask (n,), True where it succeeded."""
     near = _SMALL * (np.linalg.norm(pieces.ends - pieces.starts, axis=1) + np.abs(pieces.sizes).sum(axis=0))
     most = np.array([[one.bend / 2, one.bend / 2, 0.5, one.bend] for one in pieces.obstacles]).ravel()
     todo, part, kinks = np.arange(len(near)), pieces, pieces.kinks()

@@ -55,7 +55,7 @@ class Paths:
         return _units(first), _units(last)
 
     def at(self, which: Ints, shares: Floats) -> Floats:
-        """The points (m, 3) of paths ``which`` (m,) after ``shares`` (m,) of their lengths, from 0 to 1."""
+        """The points (m, 3) of paths ``which`` (m,) at the fractions ``shares`` (m,) of their lengths, from 0 to 1."""
         before, along, behind = self.parts[which].T
         path = shares * (before + along + behind)
         on = _clipped(path - before, along)
@@ -65,7 +65,7 @@ class Paths:
         return np.where(beyond[:, None], last, np.where(wraps[:, None], self._on_surface(which, on), straight))
 
     def _on_surface(self, which: Ints, share: Floats) -> Floats:
-        """The points (m, 3) after ``share`` (m,) of the part of the path on the surface."""
+        """The points (m, 3) at the fraction ``share`` (m,) of the part of the path on the surface."""
         first, last, axes, middles = (values[which] for values in (*self.touches, self.axes, self.middles))
         height, climb = _along(first - middles, axes), share[:, None] * _along(last - first, axes)
         turned = _turned(first - middles - height, axes, share * self.turns[which])
@@ -154,7 +154,7 @@ def _perpendicular(normals: Floats, arms: Floats) -> Floats:
 
 
 def _clipped(path: Floats, length: Floats) -> Floats:
-    """``path`` as a share of ``length``, from 0 to 1; 0 if there is no length."""
+    """``path`` as a fraction of ``length``, from 0 to 1; 0 if there is no length."""
     return np.clip(path / np.where(length > 0, length, 1.0), 0.0, 1.0)
 
 

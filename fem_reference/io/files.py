@@ -23,7 +23,7 @@ from fem_reference.io.formats import Format, formats, vtk
 from fem_reference.io.formats.msh import read_mesh
 from fem_reference.io.texts import beside, check_size, is_file, parsed_xml
 
-# The largest size in bytes of a mesh, a table or an index: a million triangles, more than our meshers and solvers can use. The
+# The maximum size in bytes of a mesh, a table or an index: a million triangles, more than our meshers and solvers can use. The
 # values of a text file need up to thirty times as much memory as the file.
 MOST_BYTES = 2**26
 # A half-written file older than this [s] is removed unless its process runs here; a newer file may be written by another machine.
@@ -45,7 +45,7 @@ def _format(path: Path, want: str, known: Collection[str]) -> Format:
 
 
 def read_surface(path: Path, unit: float) -> Surface:
-    """The triangles of a file whose coordinates are in units of ``unit`` mm; ``place`` is the path.
+    """The triangles of a file whose coordinates are in units of ``unit`` mm; its ``place`` is the path.
 
     An STL file has no shared points: its surface has three points for each triangle. InputError if the file cannot be read
     completely or has polygons other than triangles.

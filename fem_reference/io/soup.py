@@ -12,7 +12,7 @@ Soup = tuple[Any, Any]
 
 
 def arrays(soup: Soup) -> tuple[Floats, Ints]:
-    """Points (n, 3) and triangles (m, 3) as arrays; ValueError or OverflowError if ``soup`` has no such shapes."""
+    """Points (n, 3) and triangles (m, 3) as arrays; ValueError or OverflowError if ``soup`` has other shapes."""
     points, corners = (np.asarray(values) for values in soup)
     if len(corners) == 0:
         raise ValueError("no triangles")
@@ -20,7 +20,7 @@ def arrays(soup: Soup) -> tuple[Floats, Ints]:
         raise ValueError("no vertices")
     if points.shape != (len(points), 3):
         raise ValueError(f"points of shape {points.shape}")
-    with np.errstate(invalid="ignore"):  # NaN becomes some integer, which the comparison below finds
+    with np.errstate(invalid="ignore"):  # NaN becomes some integer, which the comparison below detects
         triangles = np.asarray(soup[1], np.int64)
     if triangles.shape != (len(triangles), 3) or (triangles != corners).any():
         raise ValueError(f"corners of shape {corners.shape} that are not three point numbers each")

@@ -1,6 +1,6 @@
 """TOML, JSON and XML from untrusted files: bounded in size and depth, so that reading always ends.
 
-A file is refused if it cannot be parsed, is too large, is nested too deeply, or refers to files outside its folder.
+A file is rejected if it cannot be parsed, is too large, is nested too deeply, or refers to files outside its folder.
 """
 
 import json
@@ -18,10 +18,10 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 
-# The largest size of a file in bytes: a case file has some kB, a baseline 1.3 kB per frame. The values need up to 30 times as much.
+# The maximum size of a file in bytes: a case file has some kB, a baseline 1.3 kB per frame. In memory it takes up to 30 times this.
 MOST_TOML = 2**21
 MOST_JSON = 2**25
-# The largest number of levels of nested tables and lists; case files have up to 6.
+# The maximum number of levels of nested tables and lists; case files have up to 6.
 DEEPEST = 32
 # A mesh file may not define entities: they can multiply a text a billion times, or include other files.
 _FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")
@@ -67,13 +67,13 @@ def parsed_xml(path: Path) -> ElementTree.Element:
 
 
 def check_no_entities(text: bytes) -> None:
-    """Raise ValueError if an XML text has a document type."""
+    """Raise ValueError if an XML text declares a document type or entities."""
     if any(one in text for one in _FORBIDDEN):
         raise ValueError("a document type, which no mesh file needs")
 
 
 def beside(path: Path, name: str) -> Path:
-    """The file ``name`` to which the file at ``path`` refers; ValueError if it is outside its folder, after following links."""
+    """The file ``name`` to which the file at ``path`` refers; ValueError if it is outside that file's folder."""
     found = path.parent / name
     if not found.resolve().is_relative_to(path.parent.resolve()):
         raise ValueError(f'a reference to "{name}", outside the folder of the file')

@@ -11,7 +11,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.io import soup
 from fem_reference.io.texts import beside, parsed_xml
 
-# The largest number of values in an array: ten million points.
+# The maximum number of values in an array: ten million points.
 _MOST = 3 * 10**7
 
 

@@ -200,7 +200,7 @@ def test_a_run_that_recorded_nothing_wrong_is_not_doubted() -> None:
         ({"min_det_F": [1, 0.5, 0.2], "min_det_F_quadrature": [1, 0.05, 0.4]}, "det F falls to 0.0500"),
         (
             {"outside_law": [0, 1, 1]},
-            "cells are outside the intended range of a law in 2 of 3 frames, first in 10",
+            "cells are outside the intended range of a law in 2 of 3 frames, first in frame 10",
         ),
         ({"energy_gap": [0, -0.135, 0.1]}, "the energy changed by -13.5 % without work at frame 10"),
     ],

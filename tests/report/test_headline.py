@@ -66,7 +66,7 @@ def test_a_candidate_that_nobody_judged_says_so_and_its_numbers(words, tmp_path:
     assert (
         "1 of 1 of its own checks met; doubtful: unstable equilibrium in 1 of 5 frames; doubtful: det F " in reference
     )
-    assert "the intended range of a law in 2 of 5 frames, first in 15" in reference
+    assert "the intended range of a law in 2 of 5 frames, first in frame 15" in reference
     page = (tmp_path / "out" / "bar" / "report.html").read_text()
     below = page[page.index("Deviations at their worst frames") :]
     for one in ("Fibre length", "Volume", "Surface"):  # each number of the top is in the table below, with its frame

@@ -49,7 +49,7 @@ def read(data: bytes) -> DataSet:
 
 
 class _File:
-    """The bytes of a file, text or binary, read from ``at`` on; ``values``: the number of points or cells that attributes have."""
+    """The bytes of a file, text or binary, read from ``at`` on; ``values``: the number of values of each attribute."""
 
     def __init__(self, data: bytes, at: int, *, text: bool) -> None:
         self.data, self.at, self.text, self.values = data, at, text, "0"

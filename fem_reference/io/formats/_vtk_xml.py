@@ -22,7 +22,7 @@ _KINDS = {"PolyData": ("Lines", "Strips", "Polys"), "UnstructuredGrid": ("Cells"
 _TYPES = {"Float32": "f4", "Float64": "f8"}
 _TYPES |= {f"{sign}Int{8 * size}": f"{sign or 'i'}{size}".lower() for sign in ("", "U") for size in (1, 2, 4, 8)}
 _END = re.compile(rb"</AppendedData>\s*</VTKFile>\s*\Z")
-# The largest size in bytes of a compressed array after it is expanded.
+# The maximum size in bytes of a compressed array after it is expanded.
 _MOST = 2**28
 
 

@@ -45,7 +45,7 @@ def read_mesh(path: Path) -> Any:
 
 
 def _check_declared(data: bytes) -> None:
-    """Raise ValueError if a section declares more nodes or elements, or blocks of these, than a file has bytes."""
+    """Raise ValueError if a section declares more nodes or elements, or blocks of these, than the file has bytes."""
     header = data[:60].split()
     binary, old = header[2:3] == [b"1"], header[1:2] == [b"2.2"]
     for name, first in _DECLARED.findall(data):

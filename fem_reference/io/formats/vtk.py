@@ -22,7 +22,7 @@ _WRITERS = {".vtk": "PolyDataWriter", ".vtp": "XMLPolyDataWriter", ".vtu": "XMLU
 @dataclass(frozen=True, eq=False)
 class DataBlock:
     """``cells`` between ``points`` (n, 3) [mm]: triangles (m, 3), tetrahedra (m, 4) or lines. By name, arrays ``of_points``
-    (n, ...) and ``of_cells`` (m, ...), and ``numbers`` for the whole block.
+    (n, ...) and ``of_cells`` (m, ...), and ``numbers`` for the entire block.
     """
 
     points: Floats
