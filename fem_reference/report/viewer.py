@@ -68,8 +68,8 @@ class _Box:
 def view(comparison: Comparison, budget: int = BUDGET) -> dict[str, Any]:
     """The contents of the template of the 3D view. ``data``: for the script; ``candidates``, ``quantities``: their names.
     ``numbers``: frame numbers. ``every``: the stride of frames drawn, above 1 if positions would exceed ``budget`` bytes.
-    ``error``: the greatest error of a coordinate [mm]. ``warm``: the colours of fibres; ``stretches``: places on their scale [%].
-    ``force``: the greatest force drawn [N], 0 without forces. ``attached``, ``touched``: True with such vertices; ``near``: the
+    ``error``: the greatest error of a coordinate [mm]. ``warm``: colours of fibres; ``stretches``: labels of their scale.
+    ``force``: the greatest force drawn [N], 0 without forces. ``attached``, ``touched``: True if such vertices exist; ``near``: the
     distance [mm] of touched vertices. ``version``, ``licence``: of the library.
     """
     shown = [comparison.reference, *(run for run in comparison.candidates if run.has_surface)]
@@ -135,7 +135,7 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
 
 
 def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:
-    """The places on a scale [%] that get a label: its ends, and rest unless it is near an end."""
+    """The positions [%] and values of labels on the scale of stretches: its ends, and rest unless it is near an end."""
     low, high = fibres["low"], fibres["high"]
     rest = 100 * (1 - low) / ((high - low) or 1.0)
     middle = ((rest, 1.0),) if 12 < rest < 88 else ()
@@ -157,7 +157,7 @@ def _frames(run: Run, numbers: tuple[int, ...]) -> Floats:
 
 
 def _box(reference: Floats, runs: list[Floats]) -> _Box:
-    """The box around all frames, but at most one diagonal larger on each side than that of the reference, as a run may scatter."""
+    """The box around all frames. As runs may scatter, it exceeds the reference's box by at most one diagonal on each side."""
     low, high = _bounds(reference)
     reach = float(np.linalg.norm(high - low))
     lows, highs = zip(*(_bounds(frames) for frames in [reference, *runs] if np.isfinite(frames).any()), strict=True)

@@ -22,7 +22,7 @@ ALONE = "Each candidate solves each muscle by itself, without the other muscles.
 @dataclass(frozen=True, eq=False)
 class ByMuscle:
     """Comparisons of the ``muscles`` of a case, by name. ``worst``: rows of a solver, two muscles in its run, the greatest depth
-    [mm] of their overlap, and its frame. ``lacking``: pairs of a candidate and a muscle that it lacks.
+    [mm] of their overlap, and its frame. ``lacking``: pairs of a candidate and a muscle of which it has no frames.
     """
 
     muscles: dict[str, Comparison]
@@ -75,7 +75,7 @@ def split(bench: Bench[Case], reference: Run) -> dict[str, Run]:
 
 
 def of_part(entry: Candidate, place: str, muscle: str) -> Candidate:
-    """A candidate with its folder, if any, for one ``muscle``; InputError at ``place`` if it has no frames of this muscle."""
+    """A candidate with the folder, if any, of one ``muscle``; InputError at ``place`` if it has no frames of this muscle."""
     found = _own((entry, place), muscle)
     if found is None:
         want = f'a folder "{muscle}" in it, with the frames of this muscle'

@@ -1,4 +1,4 @@
-"""The report's estimation techniques (chapter 3) on the fibres, attachments and surface of a case: errors by parameters.
+"""The report's estimation techniques (chapter 3) on the fibres, attachments and surface of a case, and their errors.
 
 The decompositions of a muscle into fibres (report 6.1.2) are also compared with each other: direction, length, points outside,
 crossings, and the reference's answer with each decomposition.
@@ -57,7 +57,7 @@ ANSWERS = (
 PULL = {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
 COUNT, CONTOURS, AROUND = 20, 20, 12
 NEAR = 0.2  # two fibres cross if they are nearer than this [mm] between their ends
-_ENDS = 0.1  # the share of a fibre left out at either end, where attachments bring fibres together
+_ENDS = 0.1  # the fraction of a fibre left out at either end, where attachments bring fibres together
 _SAMPLED = 400  # sample points of a fibre
 _SAMPLES = 20_000  # random points in the box around a muscle
 _OUTSIDE = 1e-3  # a point is outside the surface beyond this distance [mm]

@@ -121,7 +121,7 @@ def farthest(followed: Followed) -> StepCounts | None:
 
 
 def in_steps(built: MechanicalProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
-    """Compare runs of the reference to a frame, in several numbers of equal load steps, with the finest run that reached it."""
+    """Compare runs of the reference up to a frame, each in another number of equal load steps, with the finest that reached it."""
     ends, words, span = dict[int, Floats](), list[str](), steps.until - built.frames[0]
     for count in steps.counts:
         step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}
