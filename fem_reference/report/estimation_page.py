@@ -103,7 +103,7 @@ def _curves(found: Estimation) -> Drawing:
 
 
 def two_blobs(apart: float, size: int = 161) -> tuple[Floats, Floats, Floats]:
-    """Grid coordinates along (n,) and across (m,) in a plane, and the level (m, n) of two Gaussians of radius 1, positive inside."""
+    """Coordinates along (n,) and across (m,) in a plane, and the level (m, n) of two Gaussians of radius 1, positive inside."""
     along, across = np.linspace(-1.4, 1.4, size), np.linspace(-1, 0.8, size)
     x, y = np.meshgrid(along, across)
     surface = GaussianSurface(np.array([[-apart / 2, 0, 0], [apart / 2, 0, 0]]), np.ones(2))
