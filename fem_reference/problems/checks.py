@@ -132,7 +132,7 @@ def _check_rest(body: Body) -> None:
     if body.start is not None:
         begun = np.asarray(body.start(np.array(body.mesh.points)))
         if begun.shape != body.mesh.points.shape or not np.isfinite(begun).all():
-            raise InputError("start", f"positions {begun.shape}, not all finite", "finite positions (n, 3) of points (n, 3)")
+            raise InputError("start", f"positions {begun.shape}, not all finite", "finite positions (n, 3) of points")
     if body.contact is not None and not isinstance(body.contact, ContactLaw):
         raise InputError("contact", said(body.contact), "a ContactLaw, or None")
 

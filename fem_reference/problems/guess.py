@@ -111,7 +111,7 @@ def axis_of(rest: Setup) -> Floats:
 
 def sag(rest: Setup, frames: list[int], travel: float) -> float:
     """The deviation [mm] of the axis from the straight line between two attachments. It is the sum of the deviation at rest in the
-    middle third, that due to the rotation of bones, and 1/20 of the travel (a sideways shift bends the axis into two stiffer waves).
+    middle third, that due to rotating bones, and 1/20 of the travel (a sideways shift bends the axis into two stiffer waves).
     """
     if len(rest.attached) < 2:
         return 0.0

@@ -205,7 +205,7 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 
 
 def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
-    """Tetrahedra of a ``size`` [mm]; attachments have the facets inside their rims if the mesher keeps rims, else ``facets_under``."""
+    """Tetrahedra of a ``size`` [mm]; attachments have facets inside their rims if the mesher keeps rims, else ``facets_under``."""
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
     mesh = block.fill(rest.surface, size) if case.muscle.mesher == "block" else filled(rest.surface, size)

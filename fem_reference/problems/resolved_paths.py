@@ -35,7 +35,7 @@ _SHORTEST = 1e-9  # the fraction of all frames within which a long motion counts
 
 @dataclass(frozen=True)
 class Moving:
-    """Moving points (p, 3) [mm] ``at`` a frame, their ``turning``, if known, and ``place``, for messages; ``scale``: not a motion."""
+    """Points (p, 3) [mm] ``at`` a frame, their ``turning``, if known, and ``place``, for messages; ``scale``: if an amount."""
 
     place: str
     at: Callable[[float], Floats]

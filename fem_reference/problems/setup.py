@@ -36,7 +36,7 @@ def kept_distances() -> Path:
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A rigid bone with its ``surface`` at rest and its ``motion``, None if it is fixed. The allowed error and the Gaussian rounding
+    """A rigid bone with its ``surface`` at rest and its ``motion``, None if it is fixed. The allowed error and Gaussian rounding
     of its distance [mm] are those of ``CaseBone``. The vertices of the surface lie on the closed form ``solid``, if there is one.
     """
 

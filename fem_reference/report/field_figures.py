@@ -84,9 +84,9 @@ def _distances(example: Comparison, known: list[Run]) -> Drawing:
     """The difference of every run from the exact solution at the nodes, or of the candidates from the reference."""
     exact, runs, base = example.setup.exact, known, example.reference.vertex_values[-1]
     if exact is not None:
-        base, title = at(exact, example.setup.mesh.points), "Difference from the exact solution at the nodes"
+        base, title = at(exact, example.setup.mesh.points), "Difference from the exact solution at nodes"
     else:
-        runs, title = [run for run in known if run is not example.reference], "Difference from the reference at the nodes"
+        runs, title = [run for run in known if run is not example.reference], "Difference from the reference at nodes"
     apart = [np.abs(run.vertex_values[-1] - base) for run in runs]
     if not any(np.isfinite(values).all() and values.max() > 0 for values in apart):
         return Drawing(title, missing="the difference is zero everywhere, or not a number")

@@ -40,7 +40,7 @@ def check_muscle(name: object, case: object, place: str = "muscle") -> None:
     names = [one.name for one in case.muscle] if isinstance(case, MusclesCase) else []
     if name not in (names or [""]):
         got = f'"{name}"' if isinstance(name, str) else said(name)
-        raise InputError(place, got, f"one of {', '.join(names)}" if names else "none, as the case does not have several muscles")
+        raise InputError(place, got, f"one of {', '.join(names)}" if names else "none for this case")
 
 
 def check_keys(keys: object) -> Sequence[str]:
