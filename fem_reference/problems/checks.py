@@ -25,7 +25,7 @@ from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.touching import Touching, check_touching
 
 SAME = 1e-6  # fraction of the body's size by which two prescriptions of one displacement may differ
-_FLAT = 1e-9  # a cell counts as flat if its volume is below this fraction of its longest edge cubed
+_FLAT = 1e-9  # a cell is flat if the determinant of three edges is below this fraction of its longest edge cubed
 _FARTHEST = 1e9  # the maximum distance [mm] of a point from the origin
 _MOST = 100_000  # the largest number of frames
 _MOST_CELLS = 10_000_000  # the largest number of cells of a box

@@ -112,7 +112,7 @@ def headlines(comparison: Comparison) -> Headlines:
 def _checks(comparison: Comparison) -> str:
     """The number of expectations of the reference that are met, in words."""
     words = [one.word for one in comparison.verdicts if one.expectation.of == "reference"]
-    return f"{words.count('pass')} of {len(words)} of its expectations met" if words else "no expectations"
+    return f"{words.count('pass')} of {len(words)} expectations met" if words else "no expectations"
 
 
 class VerdictRow(NamedTuple):

@@ -19,7 +19,7 @@ COMMON = (0.0, 57.0)  # range of hip flexion [deg] that every case completes
 GRADES = {
     "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract; no part of the "
     "model is recalled",
-    "indicative": "within the uncertainty of each measurement, but all of these are from one specimen, quoted, fitted or recalled",
+    "indicative": "within the uncertainty of all measurements, each of which is from one specimen, quoted, fitted or recalled",
     "outside": "the model differs from a measurement of muscle by more than its uncertainty, or a measured moment arm is not "
     "within the range of the fibres in all poses",
     "verified only": "the equations are solved correctly; no measurement of muscle is compared with it",

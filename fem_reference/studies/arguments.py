@@ -93,7 +93,7 @@ def check_error_bars(bars: object, case: Case) -> None:
 
 
 def check_run(given: object, case: Case, place: str) -> None:
-    """Raise InputError unless ``given`` is a run with surface, lines or field like the ``case`` and, if it names a case, of it."""
+    """Raise InputError unless ``given`` is a run of the kind of the ``case`` (muscle or field) and, if it names a case, of this."""
     run = check(given, Run, place, "a Run, such as solve and read_run return")
     scene, effects, place = run.origin.get("scene"), run.origin.get("effects"), f'{place} "{run.name}"'
     keys = {case.key}

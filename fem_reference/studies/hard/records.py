@@ -100,7 +100,7 @@ class Shipped(Record):
 
 
 class StepCounts(Record):
-    """Numbers of equal load steps (``counts``) up to frame ``until``, at which the reference should reach the same state in all."""
+    """Numbers of equal load steps (``counts``) in which the reference solves up to frame ``until``; all should end in one state."""
 
     until: int
     counts: tuple[Annotated[int, Field(gt=0)], ...] = Field(default=(1, 10, 40), min_length=1)
