@@ -35,7 +35,7 @@ _SHORTEST = 1e-9  # the fraction of all frames within which a long motion counts
 
 @dataclass(frozen=True)
 class Moving:
-    """Points (p, 3) [mm] ``at`` a frame, their ``turning`` if known, their ``place`` for messages; ``scale``: True for an amount."""
+    """Points (p, 3) [mm] ``at`` a frame, their ``turning`` if known, the ``place`` for messages; ``scale``: True for an amount."""
 
     place: str
     at: Callable[[float], Floats]

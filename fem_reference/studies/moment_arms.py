@@ -57,7 +57,7 @@ def beside(store: Path) -> tuple[tuple[ArmsBeside, ...], dict[str, str]]:
 
 
 def of_case(wanted: ArmStudy, store: Path) -> Iterator[ArmsBeside]:
-    """The moment arms of a case compared with each of its experiments, up to the angle of its last frame; InputError below 1 rad."""
+    """The moment arms of a case compared with each of its experiments, up to its last angle; InputError if that is below 1 rad."""
     scene = casefile.read_muscle(wanted.case)
     (angles, arms), (others, larger) = (_arms(wanted, size * wanted.tet_size, store) for size in (1.0, LARGER))
     common = min(len(angles), len(others))  # both runs begin at the same angle
