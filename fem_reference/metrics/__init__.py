@@ -103,7 +103,7 @@ class Measure:
 @dataclass(frozen=True)
 class Worst:
     """A measure in its worst ``frame`` (a number, at ``index``). ``value`` and ``error_bar``, the bar of the reference (None if
-    it has none), are in ``unit``; ``where`` is the place in words.
+    it has none), are in ``unit``; ``where`` is its position in words.
     """
 
     value: float

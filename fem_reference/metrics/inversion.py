@@ -49,7 +49,7 @@ def _share(windings: Floats, areas: Floats) -> Floats:
 
 
 def _first(windings: Floats, run: Run) -> tuple[str, ...]:
-    """For each frame the triangle with the greatest of ``windings`` (f, m) and its place in the run; empty if none is above 0."""
+    """For each frame the triangle with the greatest of ``windings`` (f, m) and its position; empty if none is above 0."""
     found = np.argmax(windings, axis=1)
     middles = run.positions[np.arange(len(found))[:, None], run.surface.triangles[found]].mean(axis=1)
     return tuple(

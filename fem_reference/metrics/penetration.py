@@ -42,7 +42,7 @@ log = logging.getLogger(__name__)
 
 
 class _Worst(NamedTuple):
-    """The greatest depth or the volume of a frame, and its place in words."""
+    """The greatest depth or the volume of a frame, and its position in words."""
 
     value: float
     where: str

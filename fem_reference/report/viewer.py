@@ -5,10 +5,10 @@
     library    text of each file of three.js
     frames     numbers (f,) of the frames drawn;  colours, both, warm  stops of the colour bars: for magnitudes, for signed values
                and for fibres
-    low, step  position = low + step * whole number from 0 to 65535 [mm]
-    triangles  whole numbers (m, 3), of 4 bytes, the same for every run
+    low, step  position = low + step * integer from 0 to 65535 [mm]
+    triangles  integers (m, 3), of 4 bytes, the same for every run
     runs       name, worst (greatest distance to the reference [mm] and its frame's index), reached (f,), off (f,): number of
-               vertices outside the box, and positions: whole numbers (f, n, 3) of 2 bytes as differences from the previous
+               vertices outside the box, and positions: integers (f, n, 3) of 2 bytes as differences from the previous
                frame, zigzag (0, -1, 1, -2, ... as 0, 1, 2, 3, ...), all low bytes before all high bytes
     bones      name, triangles, positions (1, n, 3) in the same form with its own low and step, poses (f, 16) by rows
     force      the greatest force drawn [N];  attached  numbers of the vertices attached to bones
@@ -56,7 +56,7 @@ class _Box:
         return cls(low, max(float((high - low).max()) / _LEVELS, 1e-9))
 
     def whole(self, points: Floats) -> NDArray[np.uint16]:
-        """The nearest whole numbers; 0 for NaN, the edge of the box for points outside it."""
+        """The nearest integers; 0 for NaN, the edge of the box for points outside it."""
         with np.errstate(invalid="ignore", over="ignore"):
             steps = np.clip(np.round((points - self.low) / self.step), 0, _LEVELS)
         return np.nan_to_num(steps, nan=0.0).astype(np.uint16)

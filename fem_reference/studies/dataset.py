@@ -231,7 +231,7 @@ def _same_poses(one: Arrays) -> Ints:
 
 
 def _same_shapes(points: Sequence[Floats], triangles: Sequence[Ints]) -> Ints:
-    """The group of each surface; surfaces of a group have the same volume and principal moments, in any place and orientation."""
+    """The group of each surface; surfaces of a group have equal volume and principal moments, at any position and orientation."""
     measures = []
     for at, faces in zip(points, triangles, strict=True):
         spread_out = np.linalg.eigvalsh(np.cov((at[faces].mean(axis=1)).T))

@@ -19,7 +19,7 @@ from fem_reference.scenes.muscle import Keyframe, MuscleCase
 from fem_reference.studies.campaign import each
 from fem_reference.studies.execution import Bench
 
-LARGER = 1.25  # factor on the size of tetrahedra in a second run, which shows how far moment arms depend on it
+LARGER = 1.25  # ratio of tetrahedron sizes in a second and the first run, which shows the dependence of moment arms on the size
 _EVERY, _RAD = 10, 100  # frame numbers from one frame to the next, and for a turn of a bone by 1 rad
 NEMETH, BLEMKER = "nemeth_1985", "blemker_delp_2005"
 # Flexion [rad]: that of the shipped cases, and from -10 to 90 degrees, or as far as a reference converges.

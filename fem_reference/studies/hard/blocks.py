@@ -159,7 +159,7 @@ def _held(block: Lattice, hold: Hold, nodes: Ints, surface: Surface) -> Attached
 
 def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> None:
     """Raise InputError if two holds move shared vertices to different positions: most solvers would obey only one of the holds."""
-    assert hard.frames is not None  # beside a block
+    assert hard.frames is not None  # a block has frames
     keyframes = (key.frame for hold in hard.hold if hold.motion for key in hold.motion.keyframes)
     frames = sorted({*hard.frames.numbers, *keyframes})
     for (_, one), (j, other) in combinations(enumerate(ends), 2):

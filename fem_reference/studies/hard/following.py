@@ -27,7 +27,7 @@ _MOST_FOR_SECOND = 200  # tetrahedra that the second solver solves in seconds
 SAME = 0.01  # [%] of the body's size: states that differ by more are different
 _CUTS = 64  # the greatest factor by which a load step is cut before the run gives up
 MOVED = 0.1  # greatest random displacement of points of a block, in cells
-SIZES = 0.03  # greatest relative change of the size of tetrahedra of a shipped case
+SIZES = 0.03  # greatest relative change of the tetrahedron size of a shipped case
 LONGEST = 60.0  # greatest processor time [s] of a run that is repeated
 
 Solve = Callable[[Hard], tuple[Outcome, Followed]]

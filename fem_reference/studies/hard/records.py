@@ -39,8 +39,8 @@ class Lattice(Record):
     """A block of ``size`` from its ``corner``, with a number of ``cells`` along each axis, each cut into six tetrahedra.
 
     ``grading``: along each axis, ratio of last to first cell. ``jitter``: the greatest random displacement, in cell sizes, of nodes
-    inside the block and inside its faces; ``seed``: the seed of the random numbers. ``rounding``: how far the block is morphed into
-    an ellipsoid, from 0 (a block) to almost 1 (an ellipsoid). ``fibre``: the direction of fibres and of the measured
+    inside the block and inside its faces; ``seed``: the seed of the random numbers. ``rounding``: the degree to which the block is
+    morphed into an ellipsoid, from 0 (a block) to almost 1 (an ellipsoid). ``fibre``: the direction of fibres and of the measured
     lines. ``points_apart`` [mm]: the spacing of points of contact and springs, by default as on muscles.
     """
 
