@@ -60,7 +60,7 @@ def test_the_unit_is_guessed_where_only_one_makes_a_muscle_and_bones(scale: floa
 
 def test_where_several_units_make_one_it_is_asked_for() -> None:
     muscle, *bones = (files.read_surface(HIP / f"{name}.ply", 0.2) for name in ("muscle", "pelvis", "femur"))
-    want = r'--unit: got no unit, but "muscle.ply" is 41.*, possible for a muscle in mm or cm; "pelvis.ply" is .*: several units suit'
+    want = r'--unit: got no unit, but "muscle.ply" is 41.*, possible for a muscle in mm or cm; "pelvis.ply" is .*: several units'
     with pytest.raises(InputError, match=want):
         new_scene.guessed_unit(muscle, bones)
 
