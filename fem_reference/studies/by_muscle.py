@@ -37,7 +37,7 @@ class ByMuscle:
 
 
 def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, error_bars: bool = False) -> ByMuscle:
-    """A comparison for each muscle of a case with several: its part of the common reference, and candidates that solve it alone.
+    """A comparison for each of several muscles, between its part of the common reference and candidates that solve it alone.
     Recorded frames are read from folders named after the muscles; a candidate may lack some. With ``error_bars``, bars are
     computed; else stored ones are used.
     """
@@ -69,7 +69,7 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, err
 
 
 def split(bench: Bench[Case], reference: Run) -> dict[str, Run]:
-    """The run of each muscle by name, over all frames and beside the others, from the ``reference`` of all muscles."""
+    """The run of each muscle by name, over all frames and with the others as ``others``, from the ``reference`` of all muscles."""
     numbers = bench.scene.numbers
     return beside({name: complete(run, numbers) for name, run in bench.by_muscle(reference).items()})
 

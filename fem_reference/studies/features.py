@@ -35,7 +35,7 @@ class ExpectedCost(NamedTuple):
 
 
 def expected(body: Body, settings: Record) -> ExpectedCost:
-    """The cost of a muscle as a ``body`` by FEniCSx with these ``settings``."""
+    """The expected cost of a muscle as a ``body``, solved by FEniCSx with these ``settings``."""
     assert isinstance(settings, BodySettings)  # the settings of FEniCSx
     count = resources.unknowns(body.mesh, settings.element)
     chosen = resources.planned(settings, body.mesh, math.inf)

@@ -89,7 +89,7 @@ def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -
 
 def _check_held(bench: Bench[MuscleCase]) -> None:
     """Raise InputError if exact attachments would differ too much from the case: it has none, or springs whose stiffness times the
-    muscle's size is below its shear modulus.
+    size of the muscle is below the shear modulus of the muscle.
     """
     case, size = bench.scene, diagonal(bench.setup().surface.points)
     soft = [one.name for one in case.attachment if (one.stiffness or math.inf) * size < moduli(case.effects).shear]

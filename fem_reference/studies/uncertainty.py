@@ -1,4 +1,4 @@
-"""Bands of results that uncertain parameters of a case allow, from runs of its reference on a Latin hypercube."""
+"""Bands of results due to uncertain parameters of a case, from runs of its reference on a Latin hypercube."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

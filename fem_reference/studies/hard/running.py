@@ -99,7 +99,7 @@ def run(
 
 
 def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = None) -> Cell:
-    """The cell of a case by a solver; a failure is a verdict, never an exception. Not applicable if the solver leaves out an
+    """The cell of a solver on a case; a failure is a verdict, never an exception. Not applicable if the solver leaves out an
     effect: ``takes`` lists the effects that it models besides a law, None if unknown.
     """
     begin = time.perf_counter()
