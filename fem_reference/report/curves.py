@@ -93,7 +93,7 @@ def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:
 
 
 def _surface(comparison: Comparison, i: int) -> Drawing | None:
-    """The distances of a candidate's surface, above the error bars of the reference."""
+    """The distances of a candidate's surface from the reference, over the error bars of the reference."""
     run = comparison.candidates[i]
     low, high, far = surface_limits(comparison)
     measures, colour = comparison.deviations[run.name], looks(one.name for one in comparison.runs)[run.name]["color"]

@@ -130,7 +130,7 @@ def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
 
 
 def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
-    """True if bones given in closed form hide most of ``points`` (n, 3) within a distance of four vectors ``view`` (3,)."""
+    """True if bones given in closed form hide most of ``points`` (n, 3), seen from a distance of four times ``view`` (3,)."""
     behind = np.zeros(len(points), bool)
     for solid in (bone.solid for bone in bones if bone.solid is not None):
         for step in np.arange(1, 17) / 4:
