@@ -1,13 +1,13 @@
-"""Benchmarks: the speed of the reference and of the fast solvers, by asv; ``python -m benchmarks.peers``: beside FElupe and SfePy.
+"""Benchmarks of the reference and the fast solvers by asv; ``python -m benchmarks.peers`` compares with FElupe and SfePy.
 
-docs/speed.md has the commands and what was measured.
+docs/speed.md states the commands and the results.
 """
 
 from collections.abc import Callable, Iterable
 
 
 def over[F: Callable[..., object]](unit: str, /, **parameters: Iterable[object]) -> Callable[[F], F]:
-    """Mark a benchmark in a ``unit`` as one that asv makes for all combinations of named ``parameters``."""
+    """Mark a benchmark in a ``unit``, which asv runs for all combinations of the named ``parameters``."""
 
     def mark(function: F) -> F:
         names, values = tuple(parameters), tuple(map(list, parameters.values()))

@@ -1,4 +1,4 @@
-"""Bodies of our own making: a fusiform muscle, and an ellipsoid and a spindle of tetrahedra between two round bones."""
+"""Generated bodies: a fusiform muscle, and an ellipsoid and a spindle of tetrahedra between two round bones."""
 
 from dataclasses import replace
 from typing import Any
@@ -17,24 +17,24 @@ from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.paths import Rest, Turn
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 
-# The fusiform body: its length and its radius in the middle [mm], and by what share it is thinner at its ends.
+# The fusiform body: its length and its radius in the middle [mm], and the fraction by which it is thinner at its ends.
 LENGTH, RADIUS, THINNER = 60.0, 10.0, 0.6
-# Its top turns about a hinge beside its middle [mm], by this angle [rad] in so many frames: it is bent, and stretched by a sixth.
+# Its top turns about a hinge beside its middle [mm] by this angle [rad] in this number of frames: it bends, and stretches by 1/6.
 HINGE, ANGLE, FRAMES = (-25.0, 0.0, 30.0), -0.5, 6
 EFFECTS: dict[str, dict[str, Any]] = {
     "neo_hooke": {"mu": "10 kPa"},
     "incompressible": {"bulk": "10 MPa"},
     "fibre_passive_febio": {"c3": "10 kPa", "c4": 12.0, "c5": "3 MPa", "linear_from": 1.3},
 }
-# Semi-axes of the ellipsoid, whose long one is along z, and the radius of the bones beyond the ends [mm].
+# Semi-axes of the ellipsoid (the long one along z), and the radius of the bones beyond its ends [mm].
 SHORT, LONG, BONE = 10.0, 40.0, 15.0
-# The share of the half length beyond which the ellipsoid is attached, and the turn of the upper bone in a frame [rad].
+# The fraction of half its length beyond which the ellipsoid is attached, and the rotation of the upper bone per frame [rad].
 ATTACHED, TURN = 0.8, 0.01
 
 
 def fusiform(element: str, rings: int, slices: int) -> Body:
-    """A muscle like a spindle along z, of ``slices`` layers of straight cells, ``rings`` of them around its core; its fibres run
-    from end to end, its bottom is fixed and its top is turned.
+    """A spindle-shaped muscle along z with ``slices`` layers of straight cells and ``rings`` of cells around its core. Its fibres
+    run from end to end, its bottom is fixed, and its top turns.
     """
     straight = shapes.cylinder(RADIUS, LENGTH, rings, slices, ELEMENTS[element][0], 1)
     along = 2 * straight.points[:, 2:] / LENGTH - 1
@@ -50,7 +50,7 @@ def fusiform(element: str, rings: int, slices: int) -> Body:
 
 
 def _fibres(mesh: Cells) -> Floats:
-    """The unit vectors (m, 3) along the fibres in the cells of the spindle: lines that keep their share of its radius."""
+    """The unit vectors (m, 3) along the fibres in the cells of the spindle: lines at a constant fraction of its radius."""
     x, y, z = mesh.points[mesh.cells].mean(axis=1).T
     along = 2 * z / LENGTH - 1
     # The slope of the logarithm of the radius along the axis [1/mm].

@@ -1,7 +1,7 @@
-"""Growth of costs with size, on bodies of our own making: of the reference by phase, and of the fast solvers of Table 5.1.
+"""Growth of costs with size, on generated bodies: of the reference by phase, and of the fast solvers of Table 5.1.
 
-The reference is measured against its unknowns in one load step, in wall time; candidates, with the settings of the table, against
-triangles or tetrahedra in an iteration, in processor time. Memory is that which a run takes beyond that of the process before.
+For the reference, the wall time of one load step is measured over the number of unknowns; for candidates, with the settings of the
+table, the processor time per iteration over the number of triangles or tetrahedra. Memory is the increase during a run.
 """
 
 import ctypes
@@ -20,36 +20,36 @@ from fem_reference.foundations.subprocesses import forget_peak_memory, peak_memo
 from fem_reference.problems import setup as problem_setup
 from fem_reference.solvers import fenicsx
 
-# Subdivisions of the icosahedron of an ellipsoid; rings and slices of spindles of tetrahedra, and of those of the reference.
+# Subdivisions of the icosahedron of an ellipsoid; rings and slices of spindles of tetrahedra, and of bodies for the reference.
 SUBDIVISIONS = (2, 3, 4, 5, 6)
 SPINDLES = ((1, 6), (2, 9), (2, 18), (3, 24), (4, 36))
 BODIES = ((1, 4), (1, 10), (2, 16), (3, 24), (4, 36))
 ELEMENT = "P2/P1"
-# Iterations of a short and of a longer run, and how often each is made.
+# Iterations of a short and of a longer run, and the number of repeats of each.
 COUNTS, REPEATS = (1, 5), 2
 # The cost of rods grows with the number of fibres.
 GROWING = {name: one for name, one in SOLVERS.items() if one.solver != "viper"}
-# The size at which a cost is extrapolated, and how a fit is shown.
+# The size to which a cost is extrapolated, and the numbers shown of a fit.
 LARGE = 1e7
 NUMBERS = ("exponent", "standard error", "at 1e7", "at 1e7, at least", "at 1e7, at most")
 OF_REFERENCE = ("seconds_wall", "seconds_assembly", "seconds_factorisation", "seconds_krylov", "memory")
 OF_CANDIDATES = ("iteration", "memory")
 
-# Costs at a size, which stands among them.
+# Costs by name at one size, and this size.
 Point = dict[str, float]
 
 
 def of_reference(sizes: tuple[tuple[int, int], ...] = BODIES) -> list[Point]:
-    """The reference in one load step [s, MB]."""
+    """The costs of the reference in one load step [s, MB]."""
     with fenicsx.session() as own:
-        # The first, which is small, compiles and loads.
+        # The first body is small; with it, code is compiled and loaded.
         bodies = [replace(fusiform(ELEMENT, *size), frames=(0.0, 1.0)) for size in ((1, 2), *sizes)]
         begin, *found = [solve_fusiform(own, body, ELEMENT) for body in bodies]
     return [one | {"size": one["unknowns"], "memory": one["peak_memory_mb"] - begin["peak_memory_mb"]} for one in found]
 
 
 def of_candidate(name: str, most: int | None = None) -> list[Point]:
-    """A candidate in an iteration [s], and its memory [MB], with the first ``most`` sizes, by default all."""
+    """The time of a candidate per iteration [s], and its memory [MB], at the first ``most`` sizes, by default all."""
     chosen = GROWING[name]
     settings, tets = solvers.settings(chosen, name), chosen.solver == "mass_spring"
     made: list[problem_setup.Setup] = (
@@ -58,7 +58,7 @@ def of_candidate(name: str, most: int | None = None) -> list[Point]:
     points = []
     for setup in made[:most]:
         size = len(setup.rest.mesh.tets if setup.rest.mesh else setup.surface.triangles)
-        spent(chosen.solver, settings, setup, 1)  # what is compiled is loaded
+        spent(chosen.solver, settings, setup, 1)  # compiled code is loaded
         _give_back()
         forget_peak_memory()
         before = peak_memory()
@@ -70,14 +70,14 @@ def of_candidate(name: str, most: int | None = None) -> list[Point]:
 
 
 def _give_back() -> None:
-    """Give memory that is free back to the system, which else would serve again and not be seen; the C library of Linux can."""
+    """Return free memory to the system, as its reuse would not be measured; only the C library of Linux can do this."""
     gc.collect()
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
 
 
 def law(points: list[Point], cost: str) -> PowerLaw | None:
-    """The growth of a cost, None where it is above zero at fewer than three sizes."""
+    """The growth of a cost, None if it is above zero at fewer than three sizes."""
     return fit([one["size"] for one in points], [one[cost] for one in points])
 
 
@@ -89,7 +89,7 @@ def shown(found: PowerLaw | None, number: str) -> float:
 
 
 class Reference:
-    """The growth of the reference, and the costs to which it is fitted."""
+    """The growth of the costs of the reference, and the costs to which it is fitted."""
 
     timeout = 7200
 
@@ -109,7 +109,7 @@ class Reference:
 
 
 class Candidates:
-    """The growth of the fast solvers, and the costs to which it is fitted."""
+    """The growth of the costs of the fast solvers, and the costs to which it is fitted."""
 
     timeout = 7200
 

@@ -1,4 +1,4 @@
-"""A power of the size fitted to costs, with its uncertainty."""
+"""A power law of the size fitted to costs, with its uncertainty."""
 
 import math
 from collections.abc import Sequence
@@ -7,21 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-# The probability with which an interval holds another measurement.
+# The probability with which an interval contains another measurement.
 CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
 class PowerLaw:
-    """Costs over sizes, ``points`` (k, 2), about ``size^exponent``. ``uncertainty``: the standard error of the exponent."""
+    """Costs in proportion to ``size^exponent``, fitted to ``points`` (k, 2). ``uncertainty``: standard error of the exponent."""
 
     points: tuple[tuple[float, float], ...]
     exponent: float
     uncertainty: float
 
     def at(self, size: float) -> tuple[float, float, float]:
-        """The cost expected at a ``size``, and its least and greatest value: the interval in which another measurement there would
-        be found with ``CONFIDENCE``, if the power is the same that far.
+        """The cost expected at a ``size``, and the ends of the interval that contains another measurement at this size with the
+        probability ``CONFIDENCE``, if the power law is valid there.
         """
         x, y = np.log(np.array(self.points)).T
         away = math.log(size) - float(x.mean())
@@ -34,7 +34,7 @@ class PowerLaw:
 
 
 def fit(sizes: Sequence[float], costs: Sequence[float]) -> PowerLaw | None:
-    """A line through costs over sizes in logarithms, by least squares; None for fewer than three sizes whose costs are above zero.
+    """The line through the logarithms of costs over sizes, by least squares; None for fewer than three sizes with costs above zero.
 
     >>> found = fit((10, 100, 1000), (1, 10, 100))
     >>> round(found.exponent, 6), round(found.uncertainty, 6)
@@ -51,5 +51,5 @@ def fit(sizes: Sequence[float], costs: Sequence[float]) -> PowerLaw | None:
 
 
 def _exp(x: float) -> float:
-    """The exponential, infinite where it is beyond all numbers."""
+    """The exponential, infinite if it overflows."""
     return math.exp(x) if x < 700 else math.inf

@@ -1,4 +1,4 @@
-"""Costs of the finite element reference by phase: on fusiform bodies of our own making, and on muscles among bones."""
+"""Costs of the finite element reference by phase: on generated fusiform bodies, and on muscles with bones."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -26,33 +26,33 @@ from fem_reference.studies.execution import Bench
 
 # Rings and slices of the fusiform body by element: 25 000 to 29 000 unknowns.
 BODIES = {"Q1/P0": (4, 30), "P2/P0": (2, 18), "P2/P1": (2, 20)}
-# Muscle cases: the last frame (None: that of the case) and the MPI processes (None: as the case has it).
+# Muscle cases: the last frame and the number of MPI processes (None: that of the case).
 MUSCLES: dict[str, tuple[str, int | None, int | None]] = {
     "hip_flexion": ("hip_flexion", None, None),
     "gluteus_maximus to frame 100": ("gluteus_maximus", 100, None),
     "gluteus_maximus to frame 100 on 2 ranks": ("gluteus_maximus", 100, 2),
     "gluteus_maximus": ("gluteus_maximus", None, None),
 }
-# Costs as outcomes have them [s, MB, counts]; wall time is that of the parts that contain the phases, ``moved`` [mm] the root mean
-# square of the final displacement, by which two commits are seen to solve the same.
+# Costs as in outcomes [s, MB, counts]. Wall time is the sum of the ``PARTS``, which contain the phases; ``moved_mm`` is the root
+# mean square of the final displacement, which shows whether two commits solve the same problem.
 PARTS = ("seconds_set_up", "seconds_solve", "seconds_stability")
 PHASES = ("seconds_assembly", "seconds_contact", "seconds_factorisation", "seconds_krylov")
 COUNTS = ("factorisations", "krylov_iterations", "newton_iterations", "load_steps", "cut_backs", "unknowns")
 COSTS = ("seconds_wall", "seconds_processor", *PARTS, *PHASES, *COUNTS, "peak_memory_mb", "moved_mm")
 REPEATS = 3
-# Muscles whose second check is measured beside the run that it checks, at the size of quick tests with all frames of the case.
+# Muscles whose second check is measured relative to the run that it checks, at the quick size with all frames of the case.
 CHECKED = ("hip_flexion", "gluteus_medius", "gluteus_maximus")
 
 Costs = dict[str, float]
 
 
 def processor() -> float:
-    """Processor time [s] of this process and of those that it started and that run."""
+    """Processor time [s] of this process and of its running subprocesses."""
     return sum(processor_times(os.getpid()).values())
 
 
 def costs(outcome: Outcome, moved: Floats) -> Costs:
-    """The cost of a solution that displaced its nodes by ``moved`` (n, 3) [mm]; RuntimeError where it did not converge."""
+    """The cost of a solution that displaced its nodes by ``moved`` (n, 3) [mm]; RuntimeError if it did not converge."""
     if outcome.status != "converged":
         raise RuntimeError(f"{outcome.status}: {outcome.message}")
     more = {
@@ -68,14 +68,14 @@ def median(repeats: list[Costs]) -> Costs:
 
 
 def solve_fusiform(own: Session, body: Body, element: str) -> Costs:
-    """The costs of a fusiform body in the process of a session."""
+    """The costs of a fusiform body, solved in the process of a session."""
     solved = own.solve(body, fenicsx.BodySettings(element=element, first_step=1.0))
     return costs(solved.outcome, solved.states[-1].points - body.mesh.points)
 
 
 @contextmanager
 def prepared(element: str) -> Iterator[Callable[[], Costs]]:
-    """A function that solves the fusiform body in a process of its own, which has compiled and loaded what that needs."""
+    """A function that solves the fusiform body in a separate process, which has compiled and loaded all code for it."""
     body = fusiform(element, *BODIES[element])
     with fenicsx.session() as own:
         solve_fusiform(own, replace(body, frames=body.frames[:1]), element)
@@ -83,7 +83,7 @@ def prepared(element: str) -> Iterator[Callable[[], Costs]]:
 
 
 def solve_muscle(case: str, last: int | None, ranks: int | None) -> Costs:
-    """The costs of a muscle by its reference, which is not stored; InputError where its data is not here."""
+    """The costs of the reference of a muscle, which is not stored; InputError if its data are missing."""
     bench = Bench(casefile.read_muscle(case), Path(), ranks)
     settings, problem = bench.settings(bench.scene.reference, "reference"), bench.problem()
     frames = tuple(frame for frame in problem.frames if last is None or frame <= last)
@@ -95,8 +95,8 @@ def solve_muscle(case: str, last: int | None, ranks: int | None) -> Costs:
 
 
 def second_check(case: str) -> Costs:
-    """The second check of a muscle at its quick size: its processor time [s], and the ``share`` [%] of that of the whole run, which
-    is not stored and in which all counts from the surface to the check. InputError where its data is not here.
+    """The second check of a muscle at its quick size: its processor time [s], and its ``share`` [%] of the processor time of the
+    complete run from reading the surface to this check. The run is not stored. InputError if the data of the case are missing.
     """
     scene = casefile.read_muscle(case, casefile.read_muscle(case).quick)
     with TemporaryDirectory() as folder:
@@ -127,12 +127,12 @@ class Fusiform:
 
 
 class Muscle:
-    """The reference on muscles among bones, each solved once; not a number where the data of one is not here."""
+    """The reference on muscles with bones, each solved once; NaN if the data of a case are missing."""
 
     timeout = 7200
 
     def setup_cache(self) -> dict[str, Costs]:
-        """The costs by muscle; what is compiled is made before, for the first two frames."""
+        """The costs by muscle; code is compiled before, with the first two frames."""
         found = {}
         for name, (case, last, ranks) in MUSCLES.items():
             try:
@@ -149,7 +149,7 @@ class Muscle:
 
 
 class SecondCheck:
-    """The second check of muscles among bones; not a number where the data of one is not here."""
+    """The second check of muscles with bones; NaN if the data of a case are missing."""
 
     timeout = 3600
 
@@ -168,14 +168,14 @@ class SecondCheck:
 
 
 class Interleaved:
-    """The reference on fusiform bodies as asv times it: commits in turn, so that what else the machine does meets both."""
+    """The reference on fusiform bodies as timed by asv: commits alternate, so that other load of the machine affects both."""
 
     timeout = 3600
     number, repeat, rounds, warmup_time = 1, 1, 3, 0
     timer = staticmethod(processor)
 
     def setup(self, element: str) -> None:
-        """A process that has compiled and loaded what it needs."""
+        """Start a process that has compiled and loaded all code."""
         self.stack = ExitStack()
         self.solve = self.stack.enter_context(prepared(element))
 

@@ -1,8 +1,8 @@
-"""Shared part of solvers of other people: it reads an exported scene in SI units, moves its bones, and writes the frames.
+"""Shared part of third-party solvers: it reads an exported scene in SI units, moves its bones, and writes the frames.
 
 A candidate is a class with ``step(held, bones)``, ``positions()`` and ``lost``; ``main`` runs it. Its file states law, element,
-contact, threads, units and what it cannot take; the ``candidate.toml`` beside it the effects that it ``takes`` beside its law.
-What it leaves out of a scene is printed, and kept in the ``candidate.toml`` beside the frames. It needs numpy and meshio.
+contact, threads, units and what it cannot take; the ``candidate.toml`` next to it states the effects that it ``takes`` besides its
+law. Parts of a scene that it leaves out are printed, and stored in ``candidate.toml`` with the frames. It needs numpy and meshio.
 """
 
 import argparse
@@ -20,11 +20,11 @@ from typing import Any, NoReturn, Protocol
 import meshio
 import numpy as np
 
-METRE = 1e-3  # [m] a unit of length of the scene
-DENSITY = 1060.0  # [kg/m^3] of muscle: Mendez and Keys 1960, Metabolism 9
-STEP = 0.01  # [s] a step, whatever the scene's own interval: the truth is at rest in each frame
-DAMPING = 0.9  # share of the velocities that a step leaves
-LAW = ("neo_hooke", "incompressible")  # effects of the scene that a candidate's own law stands for
+METRE = 1e-3  # the unit of length of the scene [m]
+DENSITY = 1060.0  # density of muscle [kg/m^3]: Mendez and Keys 1960, Metabolism 9
+STEP = 0.01  # length of a step [s], independent of the scene's interval: the truth is in equilibrium in each frame
+DAMPING = 0.9  # fraction of the velocities that remains after a step
+LAW = ("neo_hooke", "incompressible")  # effects of the scene that the law of a candidate replaces
 
 
 def _rows(path: Path) -> list[list[str]]:
@@ -43,7 +43,7 @@ class Bone:
 @dataclass(frozen=True)
 class Scene:
     """A muscle at rest: ``points`` (n, 3) [m], ``tets`` (e, 4), vertices ``held`` (h,) by the bones ``holders`` (h,); ``mu`` and
-    ``bulk`` [Pa]; ``poses[bone][frame]`` (4, 4) [m]; ``bones`` in contact; ``effects`` by name, in words what else acts.
+    ``bulk`` [Pa]; ``poses[bone][frame]`` (4, 4) [m]; ``bones`` in contact; ``effects``: what acts, by name or in words.
     """
 
     points: np.ndarray
@@ -69,55 +69,55 @@ class Scene:
         return np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6
 
     def lame(self, most: float) -> tuple[float, float, float]:
-        """Young's modulus, lambda [Pa] and Poisson's ratio at the scene's mu, where the last is at most ``most``."""
+        """Young's modulus, lambda [Pa] and Poisson's ratio, which is at most ``most``, for the mu of the scene."""
         ratio = min((3 * self.bulk - 2 * self.mu) / (2 * (3 * self.bulk + self.mu)), most)
         return 2 * self.mu * (1 + ratio), 2 * self.mu * ratio / (1 - 2 * ratio), ratio
 
     def boundary(self) -> np.ndarray:
-        """Triangles (t, 3) of the tetrahedra's surface, seen from outside."""
+        """Outward triangles (t, 3) of the surface of the tetrahedra."""
         faces = self.tets[:, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]].reshape(-1, 3)
         _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
         return faces[first[count == 1]]
 
     def pose(self, bone: str, before: int, after: int, share: float) -> np.ndarray:
-        """The rigid motion (4, 4) a ``share`` of the way from one frame to the next."""
+        """The rigid motion (4, 4) at a fraction ``share`` of the path from one frame to the next."""
         mixed = (1 - share) * self.poses[bone][before] + share * self.poses[bone][after]
         u, _, v = np.linalg.svd(mixed[:3, :3])
         mixed[:3, :3] = u @ v
         return mixed
 
     def attached(self, poses: dict[str, np.ndarray]) -> np.ndarray:
-        """Places (h, 3) [m] of the held vertices, each with its bone."""
+        """Positions (h, 3) [m] of the held vertices, each moved with its bone."""
         at = np.array([poses[bone] for bone in self.holders]).reshape(-1, 4, 4)
         return np.einsum("hij,hj->hi", at[:, :3, :3], self.points[self.held]) + at[:, :3, 3]
 
 
 class Solver(Protocol):
-    """A solver of somebody else, set up with a scene at rest; ``lost``: what of the scene it dropped, in words."""
+    """A third-party solver, set up with a scene at rest; ``lost``: the parts of the scene that it dropped, in words."""
 
     lost: tuple[str, ...]
 
     def step(self, held: np.ndarray, bones: dict[str, np.ndarray]) -> None:
-        """Go on by ``STEP``: vertices held at (h, 3) [m], bones at their poses (4, 4)."""
+        """Advance by ``STEP``, with vertices ``held`` at (h, 3) [m] and ``bones`` at their poses (4, 4)."""
 
     def positions(self) -> np.ndarray:
         """Positions of all vertices (n, 3) [m]."""
 
 
 def refuse(why: str) -> NoReturn:
-    """End with a sentence and the exit status of a program that does not take the scene."""
+    """Print a sentence and exit with the status of a program that does not accept the scene."""
     print(why)
     sys.exit(77)
 
 
 def read(folder: Path) -> Scene:
-    """The scene that ``export`` wrote into a ``folder``; refused where it has no law that a candidate stands for."""
+    """The scene that ``export`` wrote into a ``folder``; refused without the laws that the law of a candidate replaces."""
     said, mesh = json.loads((folder / "scene.json").read_text()), meshio.read(folder / "tets.vtu")
-    laws = dict[str, Any]()  # of the first region, where there are several
+    laws = dict[str, Any]()  # of the first region, if there are several
     for effect in said["effects"]:
         laws.setdefault(effect["name"], effect["parameters"])
     if not set(LAW) <= set(laws):
-        refuse(f"the scene has {', '.join(laws)}; wanted {' and '.join(LAW)}, which the solver's own law stands for")
+        refuse(f"the scene has {', '.join(laws)}; wanted {' and '.join(LAW)}, which the law of the solver replaces")
     tets = mesh.cells_dict["tetra"]
     corners = mesh.points[tets]
     turned = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
@@ -150,7 +150,7 @@ def read(folder: Path) -> Scene:
 
 
 class Skin:
-    """The surface whose vertices are wanted, each carried by a tetrahedron: rest places plus the displacement there."""
+    """The surface whose vertices are requested, each carried by a tetrahedron: rest positions plus the displacement there."""
 
     def __init__(self, folder: Path, scene: Scene) -> None:
         rows, tets = _rows(folder / "surface_in_tets.csv"), meshio.read(folder / "tets.vtu").cells_dict["tetra"]
@@ -158,7 +158,7 @@ class Skin:
         self.corners, self.shares = tets[[int(row[1]) for row in rows]], np.array([row[2:] for row in rows], float)
 
     def moved(self, positions: np.ndarray) -> np.ndarray:
-        """Places (v, 3) [mm] where the vertices of the tetrahedra are at ``positions`` (n, 3) [m]."""
+        """Positions (v, 3) [mm] of the surface, with the vertices of the tetrahedra at ``positions`` (n, 3) [m]."""
         away = (positions - self.scene.points)[self.corners]
         return self.rest.points + np.einsum("vc,vcd->vd", self.shares, away) / METRE
 
@@ -168,8 +168,8 @@ class Skin:
 
 
 def drive(solver: Solver, scene: Scene, steps: int, keep: Any) -> float:
-    """Move the bones from frame to frame, in half of the ``steps`` and rest in the others; ``keep(frame, positions)`` takes each
-    frame. The time [s] that the solver took.
+    """Move the bones from frame to frame in the first half of the ``steps``, and keep them still in the second. Pass each frame to
+    ``keep(frame, positions)``. Return the time [s] that the solver took.
     """
     spent = 0.0
     for before, after in zip([scene.frames[0], *scene.frames], scene.frames, strict=False):
@@ -183,8 +183,8 @@ def drive(solver: Solver, scene: Scene, steps: int, keep: Any) -> float:
 
 
 def main(make: Any, package: str, **kinds: type) -> None:
-    """Run a candidate of a ``package`` on the scene and write frames; ``kinds``: its settings beside ``steps``."""
-    if hasattr(os, "sched_setaffinity"):  # one thread, whatever its library starts
+    """Run a candidate of a ``package`` on the scene and write frames; ``kinds``: its settings besides ``steps``."""
+    if hasattr(os, "sched_setaffinity"):  # one core, however many threads its library starts
         mine = sorted(os.sched_getaffinity(0))
         os.sched_setaffinity(0, {mine[os.getpid() % len(mine)]})
     words = argparse.ArgumentParser()

@@ -10,7 +10,7 @@
     print(result[mine.name, "surface_deviation", "rms"].values.max())  # [mm]
     fr.write_report(result, "my_report")
 
-Importing it does nothing. Units are mm, N, MPa, s and rad everywhere; only scene files carry other units, as text.
+Modules are loaded when a name is first used. Units are mm, N, MPa, s and rad everywhere; only scene files have others, as text.
 """
 
 import ast
@@ -19,7 +19,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-if sys.version_info[:2] < (3, 12):  # noqa: UP036 - who imports a checkout has not been asked by pip
+if sys.version_info[:2] < (3, 12):  # noqa: UP036 - pip does not check the version if a checkout is imported
     wanted = "fem_reference needs Python 3.12 or newer: python3.12 -m venv .venv, and install it there"
     raise ImportError(f"this is Python {sys.version.split()[0]} ({sys.executable}); {wanted}")
 

@@ -1,5 +1,5 @@
-"""Drake's deformable bodies (Han et al. 2023): linear tetrahedra of stable neo-Hooke, implicit steps, one thread, SI. What holds
-a vertex is linearised: it needs ``substeps``. It cannot take fibres, springs, contact (left out) or a bulk modulus of its own.
+"""Drake's deformable bodies (Han et al. 2023): linear tetrahedra of stable neo-Hooke, implicit steps, one thread, SI units. As it
+linearises attachments, it needs ``substeps``. It cannot take fibres, springs, contact (left out) or a separate bulk modulus.
 """
 
 import sys
@@ -17,7 +17,7 @@ from pydrake.systems import analysis, framework
 
 
 class Deformable:
-    """A deformable body whose held vertices are fixed to rigid bodies, which weigh tonnes and move as the bones do."""
+    """A deformable body whose held vertices are fixed to rigid bodies, which are heavy and move like the bones."""
 
     lost = ()
 
@@ -42,7 +42,7 @@ class Deformable:
         self.now = self.plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
 
     def step(self, held: np.ndarray, bones: dict[str, np.ndarray]) -> None:
-        """Move the rigid bodies from pose to pose by a step."""
+        """Move the rigid bodies to the poses of the bones in a step."""
         for name, body in self.bones.items():
             begin, end = self.plant.GetFreeBodyPose(self.now, body), math.RigidTransform(bones[name])
             turn = (end.rotation() @ begin.rotation().inverse()).ToAngleAxis()

@@ -1,6 +1,6 @@
 """MuJoCo's flexible bodies (Todorov et al. 2012): linear tetrahedra of St. Venant-Kirchhoff, implicit steps, one thread, SI units.
 
-It cannot take fibres, springs, a bulk modulus of its own (a Poisson's ratio of at most ``poisson`` stands for it), or contact with
+It cannot take fibres, springs, a separate bulk modulus (a Poisson's ratio of at most ``poisson`` replaces it), or contact with
 bones that are not convex, which it would replace by their hulls: contact is left out.
 """
 
@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from bridge import DAMPING, STEP, Scene, main
 
-HEAVY = 1e3  # [kg] a vertex that follows its bone
+HEAVY = 1e3  # mass [kg] of a vertex that follows its bone
 
 
 def _text(numbers: np.ndarray) -> str:
@@ -20,7 +20,7 @@ def _text(numbers: np.ndarray) -> str:
 
 
 class Flex:
-    """A flex of one body with three slides for each vertex."""
+    """A flex with one body and three slide joints for each vertex."""
 
     lost = ()
 
@@ -44,7 +44,7 @@ class Flex:
         self.data, self.rest, self.held = mujoco.MjData(self.model), scene.points, scene.held
 
     def step(self, held: np.ndarray, bones: dict[str, np.ndarray]) -> None:
-        """Put the held vertices where they belong and go on by a step."""
+        """Move the held vertices to their positions and advance by a step."""
         moves, speeds = self.data.qpos.reshape(-1, 3), self.data.qvel.reshape(-1, 3)
         speeds *= DAMPING
         moves[self.held], speeds[self.held] = held - self.rest[self.held], 0.0

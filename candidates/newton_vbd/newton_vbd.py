@@ -1,5 +1,5 @@
 """Newton's vertex block descent (Chen et al. 2024): linear tetrahedra of stable neo-Hooke, penalty contact with meshes, one thread,
-SI units. It cannot take fibres, springs, or a bulk modulus of its own: a Poisson's ratio of at most ``poisson`` stands for it.
+SI units. It cannot take fibres, springs, or a separate bulk modulus: a Poisson's ratio of at most ``poisson`` replaces it.
 """
 
 import sys
@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 
 class Descent:
-    """Particles at the vertices, kinematic where a bone holds them, and kinematic bodies with the bones' meshes."""
+    """Particles at the vertices, kinematic if a bone holds them, and kinematic bodies with the meshes of bones."""
 
     lost, kind, substeps = (), newton.solvers.SolverVBD, 1
 
@@ -38,7 +38,7 @@ class Descent:
         self.now, self.next, self.contacts = self.model.state(), self.model.state(), self.pipeline.contacts()
 
     def step(self, held: np.ndarray, bones: dict[str, np.ndarray]) -> None:
-        """Put bones and held vertices where they belong and go on by a share of a step."""
+        """Move bones and held vertices to their positions and advance by a part of a step."""
         turns = {name: Rotation.from_matrix(bones[name][:3, :3]).as_quat() for name in self.bones}
         for state in (self.now, self.next):
             points = state.particle_q.numpy()

@@ -1,7 +1,7 @@
 """Newton's XPBD: linear tetrahedra of ``mu/2 (I1 - 3)^2 + lambda/2 (J - 1)^2``, which has no resistance to shear at rest, penalty
 contact with meshes, one thread, SI units.
 
-It cannot take fibres, springs or a bulk modulus of its own. With 16 sub-steps of 5 iterations it explodes, with finite numbers.
+It cannot take fibres, springs or a separate bulk modulus. With 16 sub-steps of 5 iterations it diverges, with finite numbers.
 """
 
 import sys
@@ -15,7 +15,7 @@ from newton_vbd import Descent
 
 
 class Constraints(Descent):
-    """The same model by constraints, in ``substeps`` of each step."""
+    """The same model with constraints, in ``substeps`` of each step."""
 
     kind = newton.solvers.SolverXPBD
 
@@ -24,7 +24,7 @@ class Constraints(Descent):
         super().__init__(scene, iterations, poisson)
 
     def step(self, held: np.ndarray, bones: dict[str, np.ndarray]) -> None:
-        """Carry held vertices and bones over in sub-steps."""
+        """Move bones at once and held vertices in sub-steps."""
         begin = self.positions()[self.held]
         for number in range(1, self.substeps + 1):
             super().step(begin + number / self.substeps * (held - begin), bones)

@@ -1,5 +1,5 @@
 """pbatoolkit's vertex block descent (Chen et al. 2024): linear tetrahedra of stable neo-Hooke, one thread, SI units. It cannot take
-fibres, springs, a bulk modulus of its own (lambda of a Poisson's ratio of at most ``poisson`` stands for it, plus mu, as the lambda
+fibres, springs, a separate bulk modulus (lambda of a Poisson's ratio of at most ``poisson`` replaces it, plus mu, as the lambda
 of its energy is not Lame's), or bones that are not made of tetrahedra: contact is left out.
 """
 
@@ -7,7 +7,7 @@ import os
 import sys
 from pathlib import Path
 
-os.environ["OMP_NUM_THREADS"] = "1"  # read when it is loaded
+os.environ["OMP_NUM_THREADS"] = "1"  # read when the library is loaded
 import numpy as np
 from pbatoolkit import pbat
 
@@ -16,7 +16,7 @@ from bridge import DAMPING, DENSITY, STEP, Scene, main
 
 
 def meshed(data, scene: Scene):
-    """The ``data`` of an integrator with the mesh of the scene, without gravity, vertices that follow bones fixed."""
+    """The ``data`` of an integrator with the mesh of the scene, without gravity, and with fixed vertices that follow bones."""
     faces = scene.boundary().astype(np.int64)
     return (
         data.with_volume_mesh(np.asfortranarray(scene.points.T), np.asfortranarray(scene.tets.T.astype(np.int64)))
@@ -28,7 +28,7 @@ def meshed(data, scene: Scene):
 
 
 class Descent:
-    """The integrator, whose fixed vertices are put where their bones are before each step."""
+    """The integrator, whose fixed vertices are moved with their bones before each step."""
 
     lost, substeps = (), 1
 
@@ -44,7 +44,7 @@ class Descent:
         return pbat.sim.vbd.Integrator(data.with_initialization_strategy(begin).construct(validate=True))
 
     def step(self, held: np.ndarray, bones: dict[str, np.ndarray]) -> None:
-        """Put the held vertices where they belong and go on by a step."""
+        """Move the held vertices to their positions and advance by a step."""
         points = np.array(self.integrator.x, order="F")
         points[:, self.held] = held.T
         self.integrator.x, self.integrator.v = points, np.array(self.integrator.v, order="F") * DAMPING

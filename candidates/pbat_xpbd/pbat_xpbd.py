@@ -1,7 +1,7 @@
 """pbatoolkit's XPBD (Macklin and Mueller 2021, doi 10.1145/3487983.3488289): linear tetrahedra of a neo-Hookean law in two
 constraints each, one iteration in each of ``substeps``, one thread, SI units.
 
-It cannot take what ``pbat_vbd`` cannot: fibres, springs, a bulk modulus of its own, contact with bones.
+It cannot take what ``pbat_vbd`` cannot: fibres, springs, a separate bulk modulus, contact with bones.
 """
 
 import sys

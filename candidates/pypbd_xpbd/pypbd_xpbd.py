@@ -1,26 +1,26 @@
-"""PositionBasedDynamics by XPBD (Bender et al. 2017): linear tetrahedra of St. Venant-Kirchhoff, one thread. Units: cm, kg, s: it
-drops every tetrahedron whose determinant is at most 1e-6; those in cm are counted and stated. It cannot take fibres, springs, or a
-bulk modulus of its own (a Poisson's ratio of at most ``poisson`` stands for it); contact, soft there, is left out.
+"""PositionBasedDynamics by XPBD (Bender et al. 2017): linear tetrahedra of St. Venant-Kirchhoff, one thread. Units: cm, kg, s. It
+drops every tetrahedron whose determinant is at most 1e-6 cm3, and states their number. It cannot take fibres, springs, or a
+separate bulk modulus (a Poisson's ratio of at most ``poisson`` replaces it); contact, which is soft, is left out.
 """
 
 import os
 import sys
 from pathlib import Path
 
-os.environ["OMP_NUM_THREADS"] = "1"  # read when it is loaded
+os.environ["OMP_NUM_THREADS"] = "1"  # read when the library is loaded
 import numpy as np
 import pypbd
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from bridge import DAMPING, STEP, Scene, main
 
-CM = 100.0  # in a metre
-LEAST, XPBD = 1e-6, 3  # of its library: the least determinant, and the number of the method
-GRAVITY = 9.81  # along -y in units of length: its library has no call from Python that changes it
+CM = 100.0  # centimetres in a metre
+LEAST, XPBD = 1e-6, 3  # of the library: the least determinant, and the number of the method
+GRAVITY = 9.81  # acceleration along -y in the library [cm/s^2], compensated here, as Python cannot change it
 
 
 class Tetrahedra:
-    """Particles at the vertices, without mass where a bone holds them."""
+    """Particles at the vertices, without mass if a bone holds them."""
 
     def __init__(self, scene: Scene, substeps: int, poisson: float) -> None:
         (simulation := pypbd.Simulation.getCurrent()).initDefault()
@@ -41,7 +41,7 @@ class Tetrahedra:
         self.lost = (f"{dropped} of {len(scene.tets)} tetrahedra, which are too small",) if dropped else ()
 
     def step(self, held: np.ndarray, bones: dict[str, np.ndarray]) -> None:
-        """Carry the held vertices over in sub-steps of one iteration."""
+        """Move the held vertices in sub-steps of one iteration each."""
         begin = np.array([self.particles.getPosition(vertex) for vertex in self.held])
         kept, up = DAMPING ** (1 / self.substeps), np.array([0, GRAVITY * STEP / self.substeps, 0])
         for step in range(1, self.substeps + 1):

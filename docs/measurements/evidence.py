@@ -174,7 +174,7 @@ def _recalled(text: str) -> str:
 def _where(one: dict[str, Any]) -> str:
     if one["met"] or one["is_order"]:
         return "within" if one["met"] else "outside"
-    return f"outside: too {'great' if one['value'] > one['truth'] else 'small'}"
+    return f"outside: too {'large' if one['value'] > one['truth'] else 'small'}"
 
 
 def _credibility_sources() -> str:

@@ -36,7 +36,7 @@ class Statistic:
 
     ``title`` and ``part``: headings of the group of columns and of the column. ``headline``: a sentence with ``{}`` for the value.
     ``curve``: the title of the plot of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: its position in the
-    order at each place, the lowest first. ``local``: True if its error converges with the order of that at the worst point.
+    order at each place, the lowest first. ``local``: True if its error converges like that of the worst point.
     ``lone``: True for the value of a single fibre or of the force on a bone, which is not a mean. ``pooled``: True if statistics of
     its metric belong to one field in one unit; the rms of all then replaces a difference that is small by chance.
     """
@@ -103,7 +103,7 @@ class Measure:
 @dataclass(frozen=True)
 class Worst:
     """A measure in its worst ``frame`` (a number, at ``index``). ``value`` and ``error_bar``, the bar of the reference (None if
-    it has none), are in ``unit``; ``where`` is the place in words.
+    it has none), are in ``unit``; ``where`` is its position in words.
     """
 
     value: float
@@ -277,7 +277,7 @@ def as_surface(run: Run) -> Run:
 
 
 def at_vertices(run: Run, vertices: Ints) -> tuple[str, ...]:
-    """The ``vertices`` (f,) of the mesh of a field and their places, in words."""
+    """The ``vertices`` (f,) of the mesh of a field and their positions, in words."""
     places = (", ".join(f"{x:.4g}" for x in run.points[vertex]) for vertex in vertices)
     return tuple(f"vertex {vertex} at ({place})" for vertex, place in zip(vertices, places, strict=True))
 
@@ -288,7 +288,7 @@ def rms(deviations: Floats, weights: Floats) -> Floats:
 
 
 def percentile(values: Floats, weights: Floats, share: float) -> float:
-    """The smallest of ``values`` (n,) up to which they have at least a ``share`` of the weight; NaN if one is not finite."""
+    """The smallest of ``values`` (n,) with at least the fraction ``share`` of the weight up to it; NaN if any is not finite."""
     if not np.isfinite(values).all():
         return float("nan")
     order = np.argsort(values)

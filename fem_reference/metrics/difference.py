@@ -1,4 +1,4 @@
-"""Difference between a field and the reference at the vertices, as a fraction of the reference's greatest value."""
+"""Difference between a field and the reference at the vertices, as a fraction of the reference's greatest magnitude."""
 
 import numpy as np
 

@@ -11,7 +11,7 @@ from fem_reference.metrics import Measure, MeasurementContext, Statistic
 from fem_reference.metrics.edge_extension import over_edges
 from fem_reference.runs.store import Run
 
-_CURVE = "Bending at the edges from rest, mean magnitude by area"
+_CURVE = "Bending at the edges from rest, mean magnitude weighted by area"
 STATISTICS = {
     "mean": Statistic("deg"),
     "mean_magnitude": Statistic("deg", curve=_CURVE, shown={"curve": 40}),

@@ -11,7 +11,7 @@ from fem_reference.metrics import Measure, MeasurementContext, Statistic, measur
 from fem_reference.runs.store import Run
 
 STATISTICS = {
-    "mean": Statistic("%", curve="Extension of the surface's edges from rest, mean by area", shown={"curve": 30}),
+    "mean": Statistic("%", curve="Extension of edges from rest, mean weighted by area", shown={"curve": 30}),
     "rms": Statistic("%"),
     "p95": Statistic("%"),
     "max": Statistic("%", local=True),

@@ -1,5 +1,5 @@
 """Energy stored in a muscle by all its effects, but not in attachment springs or contact; only some solvers compute it. Apart from
-these and from dissipation, its change is the work of the bones, and its derivative with respect to a joint angle minus the moment.
+these and dissipation, its change is the work of the bones, and its derivative with respect to a joint angle is minus the moment.
 """
 
 from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures

@@ -1,4 +1,4 @@
-"""Distances of the ends of fibres from their places on the moving bones, in the run alone, independent of the reference. An end of
+"""Distances of the ends of fibres from their positions on moving bones, in the run alone, independent of the reference. An end of
 a fibre at an attachment moves with its bone. Fibres from a file may end beside the attached area: such fibres do not follow the
 bone, and differ in length and moment arm from fibres that reach it. A run without fibres is measured on points that its surface
 carries. :func:`fem_reference.problems.fibre_ends.attached_ends` gives the attachment of an end.

@@ -1,6 +1,6 @@
-"""Shares of a run's surface that are inside out or lie within another part of the body, compared with the reference.
+"""Fractions of a run's surface that are inside out or lie within another part of the body, compared with the reference.
 
-The shares need only the surface, so every run has them. For a solver with an interior, the smallest det F is stricter.
+The fractions need only the surface, so every run has them. For a solver with an interior, the smallest det F is stricter.
 """
 
 from functools import lru_cache
@@ -43,13 +43,13 @@ def _windings(run: Run) -> Floats:
 
 
 def _share(windings: Floats, areas: Floats) -> Floats:
-    """For each frame of ``windings`` (f, m), the share (f,) [%] of ``areas`` (m,) where they are above 0."""
+    """For each frame of ``windings`` (f, m), the fraction (f,) [%] of ``areas`` (m,) where they are above 0."""
     share = 100 * (windings > 0) @ areas / areas.sum()
     return np.where(np.isnan(windings).any(axis=1), np.nan, share)
 
 
 def _first(windings: Floats, run: Run) -> tuple[str, ...]:
-    """For each frame the triangle with the greatest of ``windings`` (f, m) and its place in the run; empty if none is above 0."""
+    """For each frame the triangle with the greatest of ``windings`` (f, m) and its position; empty if none is above 0."""
     found = np.argmax(windings, axis=1)
     middles = run.positions[np.arange(len(found))[:, None], run.surface.triangles[found]].mean(axis=1)
     return tuple(

@@ -35,7 +35,7 @@ STATISTICS = {
     ),
 }
 OF, AGAINST = "lines", "reference"
-_LEAST = 1e-6  # a force below this share of the greatest force is round-off and has no moment arm
+_LEAST = 1e-6  # a force below this fraction of the greatest force is round-off and has no moment arm
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:

@@ -70,7 +70,7 @@ def turning(joints: Sequence[Joint], context: MeasurementContext, numbers: Seque
 
 
 def _near(angles: Floats, frame: int) -> list[int]:
-    """A ``frame`` and up to two others, the nearest in time, all at different angles, in a part of the motion in one direction."""
+    """A ``frame`` and up to two others, the nearest in time, at different angles, between which the joint does not turn back."""
     before = list(_onward(angles, range(frame - 1, -1, -1), frame))
     after = list(_onward(angles, range(frame + 1, len(angles)), frame))
     if before and after and (angles[frame] - angles[before[0]]) * (angles[after[0]] - angles[frame]) > 0:

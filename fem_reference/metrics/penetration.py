@@ -34,7 +34,7 @@ OF, AGAINST = "surface", "itself"
 
 # A triangle is small enough to follow a bone if its edges are at most this many times the reach of ``Exemption``.
 _FOLLOWS = 4.0
-# A point deeper than this share of half the thickness is in the middle of a bone, and may leave the bone on the other side.
+# A point deeper than this fraction of half the thickness is in the middle of a bone, and may leave the bone on the other side.
 _MIDDLE = 0.75
 
 _value = attrgetter("value")
@@ -42,7 +42,7 @@ log = logging.getLogger(__name__)
 
 
 class _Worst(NamedTuple):
-    """The greatest depth or the volume of a frame, and its place in words."""
+    """The greatest depth or the volume of a frame, and its position in words."""
 
     value: float
     where: str
@@ -53,7 +53,7 @@ def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Mea
     bones, without the part nearest to the exempt surface; 0 if nothing is inside.
 
     A triangle follows a bone if its corners are at most r from the bone, with r the reach of ``Exemption``, and its edges at most
-    4 r long: greater depth between the corners is then only the part of a round bone that a flat triangle cuts off. Depth is
+    4 r long: a greater depth between its corners then only shows that a flat triangle cuts into a round bone. Depth is
     measured at the vertices, and also between them in triangles that do not follow the bone. If the interior of the muscle
     reaches the middle of the bone, the depth of the interior counts. Near an attachment only depth added since rest counts. The
     same holds for an attachment inside another bone that moves differently; inside its own bone depth is not checked.

@@ -1,4 +1,4 @@
-"""Stresses in the volume of a muscle, from solvers that have them: means and quantiles over the volume at rest.
+"""Stresses in the volume of a muscle, from solvers that compute them: means and quantiles over the volume at rest.
 
 The stresses are the Cauchy stress along the present fibres, the von Mises stress, and the pressure, above 0 in compression, at four
 points of each tetrahedron. The greatest stress is not measured: at the rim of an attachment it grows without bound on finer meshes.

@@ -23,7 +23,7 @@ STATISTICS = {
     "distance_mean": Statistic("mm"),
     "distance_rms": Statistic("mm"),
     "hausdorff": Statistic("mm", _TITLE, "Hausdorff", shown={"table": 70, "solvers": 60}, local=True),
-    "rms_percent": Statistic("%", _TITLE, "rms", share_of="travel", shown={"solvers": 50, "scenes": 30}),
+    "rms_percent": Statistic("%", _TITLE, "rms", share_of="maximum displacement", shown={"solvers": 50, "scenes": 30}),
     "p95_percent": Statistic("%"),
     "max_percent": Statistic("%", local=True),
     "distance_mean_percent": Statistic("%"),
@@ -80,7 +80,7 @@ def _percent(values: Floats, travel: float) -> Floats:
 
 
 def _worst(deviations: Floats, reference: Run) -> tuple[str, ...]:
-    """The vertex with the greatest deviation in each frame, and its place in the reference."""
+    """The vertex with the greatest deviation in each frame, and its position in the reference."""
     vertices = np.argmax(deviations, axis=1) % len(reference.surface.points)
     return tuple(
         f"vertex {vertex} at {place_of(at)}"

@@ -26,9 +26,9 @@ from fem_reference.scenes.muscle import MuscleCase, Outline, VertexList
 
 # Sample points of a triangle: its middle, points near its corners, and points near the middles of its sides.
 _SAMPLES = np.concatenate([np.full((1, 3), 1 / 3), 0.2 + 0.4 * np.eye(3), 0.45 - 0.35 * np.eye(3)[::-1]])
-# The most triangles of a draped patch: enough for a patch of some metres.
+# The maximum number of triangles of a draped patch: enough for a patch of several metres.
 _MOST_TRIANGLES = 2**20
-# The longest side [mm] of the triangles of a draped patch.
+# The maximum length [mm] of the sides of triangles of a draped patch.
 _SIDE = 2.0
 
 
@@ -51,7 +51,7 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
 
 
 def unshifted(case: MuscleCase) -> MuscleCase:
-    """The case with its attachments at their unshifted landmarks; the case itself where no outline is shifted."""
+    """The case with its attachments at their unshifted landmarks; the case itself if no outline is shifted."""
     still = tuple(
         one.model_copy(update={"outline": one.outline.model_copy(update={"shift": None})})
         if one.outline and one.outline.shift and one.outline.shift.by
@@ -109,7 +109,7 @@ def _is_header(cell: str) -> bool:
 
 
 def _integer(text: str) -> int | None:
-    """The integer, of at most 18 digits, in a cell."""
+    """The integer, of at most 18 digits, in a cell; None if it contains anything else."""
     return int(text) if re.fullmatch(r"-?\d{1,18}", text) else None
 
 
@@ -237,7 +237,7 @@ def field_mesh(surface: Surface, fill: Callable[[float], TetMesh]) -> TetMesh:
 
 def lean(case: MuscleCase, axis: Floats) -> float:
     """The lean of given fibres against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, with a the angle between
-    fibre and axis. The lean scales the shear by the tension of fibres. Traced and mapped fibres follow the axis, except for
+    fibre and axis. The lean scales the shear due to the tension of fibres. Traced and mapped fibres follow the axis, except for
     pennation and rotation.
     """
     turning = _turning(case)

@@ -22,7 +22,7 @@ from fem_reference.problems.problem import NOTHING, AtRest, Task
 from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
 from fem_reference.problems.touching import Touching
 
-_OUTWARDS = 0.7  # fields are also checked this far along the path from the middle of a cell to each node
+_OUTWARDS = 0.7  # fields are also checked at this fraction of the distance from the middle of a cell to each node
 Kind = Literal["tetrahedron", "hexahedron"]
 # By element: kind of cell, degree of the displacement, degree of the pressure (None: no pressure unknown; 0: constant in each
 # cell). If both degrees are equal, solvers stabilise the pressure (``is_stabilised``).
@@ -128,7 +128,7 @@ class Cells:
     facets: dict[str, Ints]
 
     def places(self) -> Iterator[Floats]:
-        """Places (m, 3) [mm] in the cells at which fields are checked: their middles, and near each of their nodes."""
+        """Points (m, 3) [mm] in the cells at which fields are checked: their middles, and near each of their nodes."""
         nodes = self.points[self.cells]
         middles = nodes.mean(axis=1)
         yield middles
@@ -142,8 +142,8 @@ class Prescribed:
     reported under its ``name``. ``components``: the prescribed axes, 0, 1, 2 for x, y, z. ``path``: a picklable callable of rest
     points (n, 3) [mm] and a frame number, which returns displacements (n, 3) [mm]. ``stiffness`` [MPa/mm]: the stiffness of springs
     over the area, which pull towards the path; None if the displacement is exact. A skin has springs only. ``anchor`` [mm]: the
-    rest place of a point that follows the path. All springs of a skin go to this point as straight tendons, and pull while they are
-    longer than at rest.
+    rest position of a point that follows the path. All springs of a skin go to this point as straight tendons, and pull while they
+    are longer than at rest.
     """
 
     name: str
@@ -154,7 +154,7 @@ class Prescribed:
     anchor: tuple[float, float, float] | None = None
 
     def displacements(self, points: Floats, frame: float) -> Floats:
-        """The path's displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components; InputError if it gives none."""
+        """The path's displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components; InputError if it returns none."""
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:
             found = np.asarray(self.path(np.array(points), frame))
@@ -233,7 +233,7 @@ class Body:
 
     @property
     def has_energy(self) -> bool:
-        """True if contact has an energy, so that its tangent is symmetric: without friction and own normals."""
+        """True if contact has an energy, so that its tangent is symmetric: without friction and without ``own_normals``."""
         return not (self.rubs or any(law.own_normals for law in self.touching))
 
     @property

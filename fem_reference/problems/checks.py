@@ -24,9 +24,9 @@ from fem_reference.problems.body import (
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.touching import Touching, check_touching
 
-SAME = 1e-6  # share of the body's size by which two prescriptions of one displacement may differ
-_FLAT = 1e-9  # a cell counts as flat below this share of its longest edge cubed
-_FARTHEST = 1e9  # the greatest distance [mm] of a point from the origin
+SAME = 1e-6  # fraction of the body's size by which two prescriptions of one displacement may differ
+_FLAT = 1e-9  # a cell is flat if the determinant of three edges is below this fraction of its longest edge cubed
+_FARTHEST = 1e9  # the maximum distance [mm] of a point from the origin
 _MOST = 100_000  # the largest number of frames
 _MOST_CELLS = 10_000_000  # the largest number of cells of a box
 _SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each other
@@ -35,7 +35,7 @@ _THINNEST = 1e6  # length / thickness of a cell: stiffnesses differ by the squar
 
 def check(body: Body, element: str, quadrature_degree: int | None = None) -> None:
     """Raise InputError unless ``body`` is valid, and ``element`` and ``quadrature_degree`` suit its cells and effects. All required
-    regions and fibre directions must exist, and all constraints must agree and be such that a solver can follow them.
+    regions and fibre directions must exist, all constraints must agree, and a solver must be able to follow them.
     """
     if not isinstance(body, Body):
         raise InputError("body", said(body), "a Body")
@@ -132,7 +132,7 @@ def _check_rest(body: Body) -> None:
     if body.start is not None:
         begun = np.asarray(body.start(np.array(body.mesh.points)))
         if begun.shape != body.mesh.points.shape or not np.isfinite(begun).all():
-            raise InputError("start", f"places {begun.shape}, not all finite", "finite places (n, 3) of points (n, 3)")
+            raise InputError("start", f"positions {begun.shape}, not all finite", "finite positions (n, 3) of points")
     if body.contact is not None and not isinstance(body.contact, ContactLaw):
         raise InputError("contact", said(body.contact), "a ContactLaw, or None")
 
@@ -233,7 +233,7 @@ def _check_needs(body: Body) -> None:
 def check_agreement(body: Body) -> None:
     """Raise InputError if a part of the body lacks a law (``regions.check``), the normal of a law is along fibres, or a tendon or
     friction is combined with tension at rest. Raise InputError also if a load acts along prescribed axes alone, two regions
-    prescribe different exact displacements at shared places, or a path cannot be followed. Displacements are compared at all
+    prescribe different exact displacements at shared points, or a path cannot be followed. Displacements are compared at all
     frames, at all stops, and halfway between them.
     """
     regions.check(body)
@@ -253,7 +253,7 @@ def check_agreement(body: Body) -> None:
             if not off.max() <= SAME * (body.size + np.abs(found).max()):
                 x, y, z = places[np.argmax(off)]
                 got = f"displacements {off.max():.4g} mm apart at ({x:.4g}, {y:.4g}, {z:.4g}) mm at frame {frame:g}"
-                raise InputError(f'prescribed "{one.name}" and "{other.name}"', got, "the same at shared places")
+                raise InputError(f'prescribed "{one.name}" and "{other.name}"', got, "the same at shared points")
 
 
 def _check_start(body: Body) -> None:

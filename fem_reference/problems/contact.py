@@ -13,11 +13,11 @@ from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.signed_distance import FAR, signed_distances
 from fem_reference.geometry.skins import Skin
 
-# The largest share of the unattached surface that may be exempt from contact; above half of this share there is a warning.
+# The maximum fraction of the unattached surface that may be exempt from contact; above half of it there is a warning.
 _LOST = 0.5
-# The least half thickness of a bone, in spacings of contact points: a thinner bone passes between four points, 0.71 spacings away.
+# The least half thickness of a bone, in spacings of contact points: a thinner bone passes between four points 0.71 spacings away.
 _THINNEST = 0.75
-# Above this share of half a bone's thickness, the direction in which to remove an overlap at rest is not defined.
+# Beyond this fraction of half a bone's thickness, the direction in which to remove an overlap at rest is not defined.
 _MIDDLE = 0.95
 
 log = logging.getLogger(__name__)
@@ -101,7 +101,7 @@ def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: flo
         shares = walked[going] / np.maximum(lengths[going], least)
         gaps = bone.shape.sample(starts[going] + shares[:, None] * paths[going]).distance
         smallest[going] = np.minimum(smallest[going], gaps)
-        # The gradient of a sampled distance has length 1 up to a tenth; beyond the grid of the distance, strides are short.
+        # The gradient of a sampled distance has length 1 to within a tenth; beyond the grid of the distance, strides are short.
         walked[going] += np.where(gaps < FAR, np.maximum(0.9 * np.abs(gaps), least), 1.0)
         going = going[walked[going] < lengths[going]]
     return smallest
@@ -118,7 +118,7 @@ def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
 
 
 def check_bone(place: str, surface: Surface, shape: Obstacle, muscle: Surface, apart: float) -> None:
-    """Raise InputError for a bone inside the muscle, which no force would move out, or too thin for points ``apart``."""
+    """Raise InputError for a bone inside the muscle, which no force would move out, or too thin for points ``apart`` [mm]."""
     if signed_distances(surface.points, muscle).max() < 0:
         raise InputError(place, "a bone entirely inside the muscle", "a bone that is partly outside")
     if not shape.half_thickness >= _THINNEST * apart:

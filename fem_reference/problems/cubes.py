@@ -12,7 +12,7 @@ from fem_reference.foundations.jets import JET_FUNCTIONS, variables
 from fem_reference.foundations.mesh import Floats
 
 FREE = None  # an axis along which no stress acts
-# The allowed stress on free sides: a share of the greatest stress, plus, for rounding, a share of the bulk modulus.
+# The allowed stress on free sides: a fraction of the greatest stress, plus, for rounding, a fraction of the bulk modulus.
 _LEFT, _ROUNDING = 1e-8, 1e-13
 
 

@@ -17,18 +17,18 @@ from fem_reference.problems.guess import Guess
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.scenes.muscle import MuscleCase
 
-# An effect that moves the surface less than this is negligible: a share of the size of the scene's tetrahedra, or of the travel of
-# the surface if that is less. Error bars of the surface (rms) are 0.03 to 0.14 of the size and 0.01 to 0.05 of the travel; error
-# bars of fibre lengths and volumes are smaller if only these change.
+# An effect that moves the surface less than this is negligible: a fraction of the size of tetrahedra, or of the greatest
+# displacement (travel) of the surface if that is less. Error bars of the surface (rms) are 0.03 to 0.14 of the size and 0.01 to
+# 0.05 of the travel; error bars of fibre lengths and volumes are smaller if only these change.
 TOLERANCE = 0.005
 # The negligible change of stress by an effect, relative to the stress of the others, and the least strain assumed for it.
 STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
-# The error of the guessed position of a point, as a share of its path past a bone (0.83 in `hip_flexion`).
+# The error of the guessed position of a point, as a fraction of its path past a bone (0.83 in `hip_flexion`).
 _DOUBT = 1.0
 # The numbers of sampled frames, evenly spread, and of sampled vertices.
 _FRAMES, _VERTICES = 9, 1500
 _PLACES = 6000  # the number of contact points sampled for their distance to bones
-_ALONG = 0.7  # triangles are sampled for the stretch along a direction if its share in their plane is above this
+_ALONG = 0.7  # triangles are sampled for the stretch along a direction if its component in their plane is above this
 _STILL = 1e-6  # motion [mm] that is only round-off
 _FELT = 1.0  # a distance [mm] from a bone that exceeds any smoothing of contact
 
@@ -59,7 +59,7 @@ class Decision:
         """The decision in words."""
         if self.indicator is None:
             pressing = isinstance(self.effect, Interaction)
-            return "kept, as no estimate shows what touches" if pressing else "kept, as part of the material"
+            return "kept, as no estimate shows which surfaces touch" if pressing else "kept, as part of the material"
         return f"{self._word}, about {self._because}; {self.indicator.rule}: {self.indicator.number:.2g}"
 
     def __str__(self) -> str:
@@ -160,7 +160,7 @@ def _instants(case: MuscleCase) -> tuple[float, ...]:
 
 
 def _shear(case: MuscleCase, rest: Setup) -> float:
-    """The shear modulus at rest [MPa] of the stored energies, without fibres, at the softest place if regions differ."""
+    """The shear modulus at rest [MPa] of the stored energies, without fibres, at the softest point if regions differ."""
     stored = [one for one in case.effects if isinstance(one, Energy) and one.stored and not isinstance(one, Ramped)]
     laws = [(one, 1.0) for one in stored]
     isotropic = [(one, 1.0) for one in stored if not one.needs]
@@ -219,7 +219,7 @@ def stretched(rest: Setup, positions: Floats) -> tuple[float, float]:
 
 
 def _near(bone: Bone, points: Floats, moved: Mapping[int, Floats] | Mapping[float, Floats], doubt: float) -> Near:
-    """The gap of ``moved`` ``points`` (n, 3) to a ``bone``; ``doubt``: its greatest error, as a share of the path past it."""
+    """The gap of ``moved`` ``points`` (n, 3) to a ``bone``; ``doubt``: its greatest error, as a fraction of the path past it."""
     low, high = bone.surface.points.min(axis=0), bone.surface.points.max(axis=0)
     local = np.stack([apply(np.linalg.inv(bone.pose(frame)), at) for frame, at in moved.items()])
     off = doubt * np.linalg.norm(local - points, axis=2)

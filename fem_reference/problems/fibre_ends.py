@@ -43,7 +43,7 @@ class FibreEnds:
         return np.asarray((self.distance > REACHES) & np.isnan(self.tendons[:, :, 0]))
 
     def taken(self, rest: Floats, frame: float) -> Floats:
-        """The places (k, 2, 3) [mm] of ends at ``rest`` (k, 2, 3) [mm] moved with their bones to a ``frame``."""
+        """The positions (k, 2, 3) [mm] of ends at ``rest`` (k, 2, 3) [mm] moved with their bones to a ``frame``."""
         found = np.array(rest)
         for i, one in enumerate(self.attached):
             found[self.by == i] = apply(one.bone.pose(frame), rest[self.by == i])

@@ -12,7 +12,7 @@ from fem_reference.geometry.nested import EDGES, PARTS
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Kind, facet_corners, reference_nodes
 
-# The shares of a cell's corners in the nodes of its parts are multiples of 1 over this number.
+# The weights (shares) of a cell's corners in the nodes of its parts are multiples of 1 over this number.
 _SHARES = 64
 
 
@@ -74,12 +74,12 @@ def _parts(kind: Kind) -> Floats:
 
 
 def _linear(kind: Kind, places: Floats) -> Floats:
-    """The share (..., c) of each corner at places (..., 3) of the reference cell."""
+    """The linear shape functions (..., c) of the corners at ``places`` (..., 3) of the reference cell."""
     return _shape(kind, 1, places.reshape(-1, 3)).reshape(*places.shape[:-1], -1)
 
 
 def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
-    """The values (q, k) of the nodes' polynomials (1 at one node and 0 at all others) at ``places`` (q, 3) in the cell."""
+    """The shape functions (q, k) of the nodes at ``places`` (q, 3) of the reference cell."""
     powers = np.array([p for p in product(range(degree + 1), repeat=3) if kind == "hexahedron" or sum(p) <= degree])
     nodes, points = ((some[:, None, :] ** powers).prod(axis=2) for some in (reference_nodes(kind, degree), places))
     return np.asarray(np.linalg.solve(nodes.T, points.T).T)
@@ -116,7 +116,7 @@ def _facets(mesh: Cells, names: Ints, shares: Ints) -> dict[str, Ints]:
 
 
 def _in_parts(skin: Skin, mesh: Cells) -> Skin:
-    """The skin with each point in the nearest part of its cell; in straight tetrahedra, the part with the greatest least share."""
+    """The skin with each point in the nearest part of its cell; in straight tetrahedra by barycentric coordinates."""
     corners = mesh.points[mesh.cells[skin.cells, :4]]
     places, parts = barycentric(skin.points, corners)[:, 1:], _parts("tetrahedron")
     inside = np.linalg.solve(edge_vectors(parts)[None], (places[:, None] - parts[None, :, 0])[..., None])

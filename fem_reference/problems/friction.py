@@ -12,7 +12,7 @@ from fem_reference.foundations.mesh import Floats
 
 def check(coefficients: Iterable[float | None], *, begun: bool) -> None:
     """Raise InputError if a coefficient of friction is neither None nor above 0, or if a body with friction has ``begun`` deformed
-    or under tension. The places to which its points stick are then unknown.
+    or under tension. The positions to which its points stick are then unknown.
     """
     for one in (one for one in coefficients if one is not None):
         if not (isfinite(one) and one > 0):

@@ -98,7 +98,7 @@ def described_motion(rest: Setup) -> str:
     how = "longer" if lengths[most] > lengths[0] else "shorter"
     change = f"{100 * abs(lengths[most] / lengths[0] - 1):.0f} % {how}, in frame {rest.frames[most]}"
     names = f"{rest.attached[0].attachment} to {rest.attached[-1].attachment}"
-    return f"from {names} it is {lengths[0]:.4g} mm at rest, and at most {change}"
+    return f"the distance from {names} is {lengths[0]:.4g} mm at rest, and at most {change}"
 
 
 def axis_of(rest: Setup) -> Floats:
@@ -111,7 +111,7 @@ def axis_of(rest: Setup) -> Floats:
 
 def sag(rest: Setup, frames: list[int], travel: float) -> float:
     """The deviation [mm] of the axis from the straight line between two attachments. It is the sum of the deviation at rest in the
-    middle third, the deviation by turning bones, and 1/20 of the travel (a sideways shift bends the axis into two stiffer waves).
+    middle third, that due to rotating bones, and 1/20 of the travel (a sideways shift bends the axis into two stiffer waves).
     """
     if len(rest.attached) < 2:
         return 0.0

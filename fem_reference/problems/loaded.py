@@ -32,7 +32,7 @@ def _exact(body: Body) -> list[tuple[Prescribed, Ints]]:
 
 
 def _places(body: Body) -> Iterator[Floats]:
-    """The points (n, 3) [mm] at rest, then at and between frames, moved by exact prescribed displacements, which may tilt them."""
+    """The points (n, 3) [mm] at rest, then at and between frames, moved by exact prescribed displacements: facets may tilt."""
     yield body.mesh.points
     ends = np.unique([*body.frames, *body.stops])
     for frame in np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]):
@@ -53,7 +53,7 @@ def _fixed(body: Body, facets: Ints) -> Bools:
 
 
 def _normals(points: Floats, facets: Ints) -> Floats:
-    """The sizes (f, 3) of the components of the normals of ``facets`` (f, 3 or 4), the greatest over the triangles of each."""
+    """The absolute components (f, 3) of the normals of ``facets`` (f, 3 or 4), each the maximum over triangles of the facet."""
     corners = [points[column] for column in facets.T]
     crosses = [np.abs(np.cross(b - a, c - a)) for a, b, c in combinations(corners, 3)]
     greatest = np.max(crosses, axis=0)

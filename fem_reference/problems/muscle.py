@@ -205,7 +205,7 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 
 
 def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
-    """Tetrahedra of a ``size`` [mm]. Attachments have the facets inside their rims if the mesher keeps rims, else those below."""
+    """Tetrahedra of a ``size`` [mm]; attachments have facets inside their rims if the mesher keeps rims, else ``facets_under``."""
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
     mesh = block.fill(rest.surface, size) if case.muscle.mesher == "block" else filled(rest.surface, size)
@@ -250,7 +250,7 @@ def _attached(case: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tu
 
 
 def solid(bone: CaseBone) -> Obstacle | None:
-    """The obstacle of a ``bone`` with a closed form; None if the bone is a surface in a file."""
+    """The closed form of a ``bone``; None if the bone is a surface in a file."""
     given = ((name, getattr(bone, name)) for name in CLOSED_FORMS)
     return next((CLOSED_FORMS[name](**form.model_dump()) for name, form in given if form is not None), None)
 

@@ -227,7 +227,7 @@ def _apart(one: Surface, other: Surface) -> float:
 
 
 def _travel(rest: Setup) -> float:
-    """The longest path [mm] of a point of the muscle with any bone, sampled at frames, at keyframes, and in between."""
+    """The greatest displacement [mm] of a point of the muscle with any bone, sampled at frames, at keyframes, and in between."""
     points = rest.surface.points
     moved = [
         np.linalg.norm(apply(bone.pose(frame), points) - points, axis=1).max()

@@ -53,7 +53,7 @@ class Affine:
 def radially(
     share: float, along: tuple[float, float, float] = (1.0, 1.0, 1.0), knots: tuple[tuple[float, float], ...] = ONCE
 ) -> Affine:
-    """Displacement away from the origin by ``share`` of the distance times the amount, along the axes with an ``along`` of 1."""
+    """Displacement away from the origin by ``share`` times the distance and the amount, along the axes with an ``along`` of 1."""
     x, y, z = along
     return Affine(((share * x, 0.0, 0.0), (0.0, share * y, 0.0), (0.0, 0.0, share * z)), knots=knots)
 

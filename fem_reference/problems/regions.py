@@ -24,7 +24,7 @@ _LEAST = 0.5  # The least accepted sum, at a point, of the shares of all laws of
 _REACHED = 0.25
 _ROUNDED = 1e-6  # the rounding error of a sum of shares
 _SURE = 0.99  # a greatest share in a region is reported if it is below this
-_SEEN = 1e-3  # an overlap is reported if its share of the volume is above this
+_SEEN = 1e-3  # an overlap is reported if its fraction of the volume is above this
 
 
 def of_case(case: MuscleCase, rest: Setup, fill: Callable[[float], TetMesh]) -> dict[str, Region]:

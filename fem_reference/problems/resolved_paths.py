@@ -1,8 +1,8 @@
 """Frame numbers at which load steps end, so that no step skips motion between the requested frames.
 
 Between two stops no bone and no prescribed region turns by more than a right angle: from half a turn on, the straight line between
-two poses loses the sense of rotation. None moves farther than the size of the body, without the motion common to all. None moves
-out and back by more than both a fifteenth of its distance and a hundredth of the body's size.
+two poses loses the sense of rotation. Apart from the motion common to all, none moves farther than the size of the body. No point
+moves out and back: no path exceeds 1.12 times the distance between its ends by more than a hundredth of the body's size.
 
 Motions and paths of this package state the frames at which they bend and the angles by which they turn in between (``turning``), so
 this holds for all of them. Any other function of a frame number is sampled 1024 times over all frames, at least 16 times between
@@ -30,12 +30,12 @@ _BENT, _BACK = 1.12, 0.01
 _SAMPLES, _BETWEEN = 1024, 16  # the number of samples of an unknown motion, over all frames and between two
 _POINTS = 32  # the number of sampled points of a region
 _MOST = 20_000  # the largest number of sampled frames
-_SHORTEST = 1e-9  # the share of all frames within which a long motion counts as a jump
+_SHORTEST = 1e-9  # the fraction of all frames within which a long motion counts as a jump
 
 
 @dataclass(frozen=True)
 class Moving:
-    """Moving points (p, 3) [mm] ``at`` a frame, their ``turning``, if known, and ``place``, for messages; ``scale``: an amount."""
+    """Points (p, 3) [mm] ``at`` a frame, their ``turning`` if known, the ``place`` for messages; ``scale``: True for an amount."""
 
     place: str
     at: Callable[[float], Floats]
@@ -121,7 +121,7 @@ def _grid(thing: Moving, frames: Sequence[float]) -> Floats:
 
 
 class _Samples:
-    """Samples at ``frames`` (m,): places (m, p, 3), rotations (m,) [rad], path lengths (m, p) [mm] without the common motion."""
+    """Samples at ``frames`` (m,): positions (m, p, 3), rotations (m,) [rad], path lengths (m, p) [mm] without the common motion."""
 
     def __init__(self, things: Sequence[Moving], frames: Floats, size: float) -> None:
         self.things, self.frames, self.size = things, frames, size

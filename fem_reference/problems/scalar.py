@@ -33,7 +33,7 @@ class Flux:
 @dataclass(frozen=True, eq=False)
 class FieldProblem:
     """A scalar field to be solved: ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node (the vertices, then
-    for order 2 the midpoints of ``mesh.edges``), NaN if it is free; ``upper`` (m,) the share of each cell above the mean y;
+    for order 2 the midpoints of ``mesh.edges``), NaN if it is free; ``upper`` (m,) the fraction of each cell above the mean y;
     ``tau`` (m,) of the stabilised form, None for the plain form; ``peclet`` the mesh Peclet number; ``exact`` the known solution.
     """
 
@@ -84,7 +84,7 @@ class FieldProblem:
 
     @property
     def advection(self) -> Advection | None:
-        """The advection, None if nothing flows."""
+        """The advection, None without flow."""
         return next((effect for effect in self.effects if isinstance(effect, Advection)), None)
 
 
@@ -103,7 +103,7 @@ def build(case: ScalarCase, refinements: int = 0) -> FieldProblem:
     form, fixed = case.element.form, _fixed(case, mesh, given)
     if np.isnan(fixed).all() and not any(isinstance(effect, Reaction) and effect.rate for effect in case.effects):
         place = join(case.place, "boundary")  # the solution is unique only up to a constant
-        raise InputError(place, "no value anywhere and no reaction", "a value somewhere, or a reaction")
+        raise InputError(place, "no prescribed value and no reaction", "a prescribed value, or a reaction")
     return FieldProblem(
         mesh,
         case.element.order,
@@ -292,7 +292,7 @@ def numbers(path: Path) -> Floats:
 
 
 def whole_numbers(path: Path, values: Floats) -> Ints:
-    """``values`` of a file as numbers of vertices; InputError if they are not whole numbers."""
+    """``values`` of a file as numbers of vertices; InputError if they are not integers."""
     wrong = (values != np.round(values)) | (np.abs(values) > np.iinfo(np.int32).max)
     if wrong.any():
         raise InputError(str(path), f"the vertex {values[wrong][0]:g}", "vertices, numbered from 1")

@@ -23,7 +23,7 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.problem import AtRest, Task
 from fem_reference.scenes.muscle import MuscleCase, Vector
 
-# Distances to a bone are computed up to this far [mm] from it.
+# Distances to a bone are computed up to this distance [mm] from it.
 DISTANCE_MARGIN = 12.0
 # The greatest angle [rad] and distance [mm] between the axis of a joint and the axis of its bone's rotation.
 _SAME_DIRECTION, _SAME_LINE = 1e-6, 1e-3
@@ -36,7 +36,7 @@ def kept_distances() -> Path:
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A rigid bone with its ``surface`` at rest and its ``motion``, None if it rests. The allowed error and the Gaussian rounding
+    """A rigid bone with its ``surface`` at rest and its ``motion``, None if it is fixed. The allowed error and Gaussian rounding
     of its distance [mm] are those of ``CaseBone``. The vertices of the surface lie on the closed form ``solid``, if there is one.
     """
 

@@ -19,7 +19,7 @@ from fem_reference.problems.checks import check_box
 Map = Callable[[Floats], Floats]
 Counts = tuple[int, int, int]
 
-# Nodes closer to each other than this share of the body's size are one node.
+# Nodes closer to each other than this fraction of the body's size are one node.
 _SAME = 1e-9
 # The bulge of the sides of the square in a disc for which three blocks meet at its corners at 120 degrees each.
 _BULGE = np.tan(np.pi / 12) / 2
@@ -28,7 +28,7 @@ _SQUARE_IN_CYLINDER = 0.45
 _SQUARE_IN_VENTRICLE = 0.22
 # The ventricle of Land et al. 2015 (doi 10.1098/rspa.2015.0641): semi-axes inside, wall thickness, and z of its base [mm].
 _SHORT, _LONG, _WALL, _BASE = 7.0, 17.0, 3.0, 5.0
-# The relative excess of the slope of the angle at the apex over its mean for which arc length grows evenly.
+# At the apex, the slope of the angle exceeds its mean by this fraction, so that arc length grows evenly.
 _APEX = 0.3
 
 
@@ -46,7 +46,7 @@ class Brick:
 
 
 def mapped(blocks: Sequence[Brick], kind: Kind, degree: int) -> Cells:
-    """The body that ``blocks`` make up: nodes at the same place are merged, and every cell has a positive Jacobian."""
+    """The body that ``blocks`` make up: nodes at the same position are merged, and every cell has a positive Jacobian."""
     grids = [tuple(degree * count + 1 for count in block.counts) for block in blocks]
     units = [np.indices(grid).reshape(3, -1).T / np.subtract(grid, 1) for grid in grids]
     points, name = _merged(np.concatenate([block.place(unit) for block, unit in zip(blocks, units, strict=True)]))
@@ -63,7 +63,7 @@ def mapped(blocks: Sequence[Brick], kind: Kind, degree: int) -> Cells:
 
 
 def _lattice(counts: Counts, kind: Kind, degree: int) -> Ints:
-    """Places of the nodes of each cell in the lattice of nodes, (m, k, 3); tetrahedra are the six Kuhn tetrahedra of each cube."""
+    """Lattice indices (m, k, 3) of the nodes of each cell; tetrahedra are the six Kuhn tetrahedra of each cube."""
     nodes = reference_nodes(kind, degree)
     if kind == "hexahedron":
         patterns = [nodes]
@@ -169,8 +169,8 @@ def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, d
 
 
 def _patches(place: Callable[[Floats, Floats, Floats], Floats], counts: Counts, ends: dict[str, str]) -> list[Brick]:
-    """Three blocks of an octant around its corner, each by the ``place`` of points (n, 3) on the unit cube's outer faces, unit
-    vectors (n, 3) at even angles along an edge, and the share (n, 1) of the path outward; ``ends``: the faces z0 and z1.
+    """Three blocks of an octant around its corner. ``place`` maps points (n, 3) on outer faces of the unit cube, unit vectors
+    (n, 3) at even angles along an edge, and the fraction (n, 1) of the path outward to points; ``ends``: the faces z0 and z1.
     """
 
     def patch(axis: int) -> Brick:

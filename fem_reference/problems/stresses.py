@@ -23,7 +23,7 @@ Acting = Sequence[tuple[Effect, float]]
 Shares = Mapping[str, Floats]
 NONE: Shares = MappingProxyType({})
 
-# The greatest number of sampled tetrahedra, evenly spread, and of places evaluated at once, so that their jets fit into a cache.
+# The greatest number of sampled tetrahedra, evenly spread, and of points evaluated at once, so that their jets fit into a cache.
 _MOST, AT_ONCE = 2048, 1024
 _SMALLEST = 0.05  # the least det F of sampled tetrahedra: curved tetrahedra may be inverted between their corners
 

@@ -14,7 +14,7 @@ from fem_reference.report.pages import Page, PageHead
 
 log = logging.getLogger(__name__)
 
-LONGEST = 100  # the greatest number of characters in the name of a page
+LONGEST = 100  # the maximum number of characters in the name of a page
 INDEX = "index"  # the name of the index page, and its kind
 # Names of other HTML files in subfolders that are listed too.
 _OTHERS = ("report.html", "index.html")
@@ -30,8 +30,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Asked:
-    """A page as a command requests it: the ``verb``, the ``base`` of its default name, the ``parts`` that determine it, and the
-    name ``page`` of its file if it has its own folder, else an empty string.
+    """A page requested by a command: the ``verb``, the ``base`` of the default name, the ``parts`` of the command line, and
+    ``page``, the name of the file if the page has a folder of its own, else an empty string.
     """
 
     verb: str

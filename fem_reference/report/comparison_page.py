@@ -85,8 +85,8 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
 
 
 def widest(bar: ErrorBar, measure: Measure | None) -> int:
-    """The index of the widest ``bar`` among the frames in which the reference's ``measure`` has a value (a moment arm needs a
-    force); an unknown bar in such a frame counts as the widest.
+    """The index of the frame with the widest ``bar`` among those in which the reference's ``measure`` has a value (a moment arm
+    has none without a force); an unknown bar in one of these frames counts as the widest.
     """
     if measure is None or not np.isfinite(measure.values).any():
         return bar.widest
@@ -112,7 +112,7 @@ def headlines(comparison: Comparison) -> Headlines:
 def _checks(comparison: Comparison) -> str:
     """The number of expectations of the reference that are met, in words."""
     words = [one.word for one in comparison.verdicts if one.expectation.of == "reference"]
-    return f"{words.count('pass')} of {len(words)} of its own checks met" if words else "no checks of its own"
+    return f"{words.count('pass')} of {len(words)} expectations met" if words else "no expectations"
 
 
 class VerdictRow(NamedTuple):

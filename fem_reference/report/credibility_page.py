@@ -15,11 +15,11 @@ from fem_reference.io.texts import finite, plain
 from fem_reference.report.drawings import Drawing, colour_of, drawn
 from fem_reference.report.pages import Page
 
-COMMON = (0.0, 57.0)  # hip flexion [deg] that every case completes
+COMMON = (0.0, 57.0)  # range of hip flexion [deg] that every case completes
 GRADES = {
     "validated": "within the scatter of an experiment over several specimens, read in its publication or abstract; no part of the "
     "model is recalled",
-    "indicative": "within the uncertainty of every measurement, but each is from one specimen, quoted, fitted or recalled",
+    "indicative": "within the uncertainty of all measurements, each of which is from one specimen, quoted, fitted or recalled",
     "outside": "the model differs from a measurement of muscle by more than its uncertainty, or a measured moment arm is not "
     "within the range of the fibres in all poses",
     "verified only": "the equations are solved correctly; no measurement of muscle is compared with it",
@@ -66,8 +66,8 @@ def met(values: Mapping[str, float], one: Beside) -> bool | None:
 
 
 def differences(row: Row, arms: Iterable[ArmsBeside]) -> str:
-    """The number of measured values that the model misses on either side, and the distances. For moment arms they are means over
-    the poses of each case in mm, otherwise they are in units of the measurement's uncertainty. Wrong rankings count separately.
+    """The numbers of values of the model that are too large and too small, and their differences from measurements: in units of
+    the uncertainty, or for moment arms the means over the poses of each case [mm]. Wrong rankings are counted separately.
     """
     own = [one for one in row.beside if one.kind == "measurement"]
     orders, numbers = ([one for one in own if one.is_order is kind] for kind in (True, False))
@@ -77,7 +77,7 @@ def differences(row: Row, arms: Iterable[ArmsBeside]) -> str:
         missed, unit = [one.bias for one in arms if one.kind == "measurement" and not of_arms(one).met], "mm"
     great, small = ([side * far for far in missed if side * far > 0] for side in (1, -1))
     said = [
-        f"{len(far)} too {word}, by {_span(far)} {unit}" for word, far in (("great", great), ("small", small)) if far
+        f"{len(far)} too {word}, by {_span(far)} {unit}" for word, far in (("large", great), ("small", small)) if far
     ]
     if lost := sum(map(math.isnan, missed)):
         said.append(f"{lost} without a number")
@@ -92,7 +92,7 @@ def _span(values: list[float]) -> str:
 
 
 def specimens(row: Row) -> str:
-    """The number of specimens by source of the measurements."""
+    """The number of specimens of each source of measurements."""
     known = {one.experiment: one.n for one in row.beside if one.kind == "measurement"}
     return ", ".join(f"{source(name)}: {n or 'not known'}" for name, n in known.items())
 
@@ -151,7 +151,7 @@ def _drawing(arms: ArmsBeside) -> Drawing:
         axes.fill_between(
             at, own.low, own.high, color=colour_of(1), alpha=0.35, linewidth=0, label="fibres of the reference"
         )
-        axes.plot(at, arms.middle, color=colour_of(1), label="their mean")
+        axes.plot(at, arms.middle, color=colour_of(1), label="mean of these fibres")
         if arms.is_curve:
             axes.plot(at, known.low, "--", color="#1d1d1f", label="published")
         else:

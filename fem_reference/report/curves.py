@@ -17,8 +17,8 @@ from fem_reference.report.tables import inversion
 from fem_reference.report.words import words
 
 _KNOWN = "error bar"
-_FAR = 50.0  # ratio of two candidates' greatest distances beyond which the common axis is logarithmic
-_RANGE = "least and greatest fibre"
+_FAR = 50.0  # ratio of two candidates' maximum distances beyond which the common axis is logarithmic
+_RANGE = "minimum and maximum over the fibres"
 _STATISTICS = (
     ("max", "worst vertex", "-"),
     ("hausdorff", "Hausdorff", "--"),
@@ -38,13 +38,13 @@ def curves(comparison: Comparison) -> list[Drawing]:
 
 
 def label_of(inverted: Measure) -> str:
-    """The words that distinguish the inversion measures: the places at which det F is smallest."""
+    """The words that distinguish the inversion measures: the kind of points at which det F is taken."""
     return words(inverted.statistic.removeprefix("min_det_F").lstrip("_"))
 
 
 def _of_runs(comparison: Comparison, key: tuple[str, str], title: str, i: int | None = None) -> Drawing | None:
     """The change of a measure from rest for every run, with the error bar of the reference; over frames, or over the angle of joint
-    ``i`` in the frames in which only this joint rotates. None if nothing is known.
+    ``i`` in the frames in which only this joint rotates. None if no run has the measure.
     """
     context, numbers = comparison.context, comparison.reference.numbers
     measures = {run.name: find(comparison.changes[run.name], *key) for run in comparison.runs}
@@ -80,7 +80,7 @@ def _draw_runs(
 
 
 def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:
-    """The ends [mm] of the axis that the surfaces of all candidates share; True if they differ so much that it is logarithmic."""
+    """The ends [mm] of the common axis of all surface curves; True if candidates differ so much that the axis is logarithmic."""
     wanted = [("surface_deviation", statistic) for statistic, _, _ in _STATISTICS]
     tops = []
     for measures in comparison.deviations.values():
@@ -93,7 +93,7 @@ def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:
 
 
 def _surface(comparison: Comparison, i: int) -> Drawing | None:
-    """The distances of a candidate's surface, above the error bars of the reference."""
+    """The distances of a candidate's surface from the reference, over the error bars of the reference."""
     run = comparison.candidates[i]
     low, high, far = surface_limits(comparison)
     measures, colour = comparison.deviations[run.name], looks(one.name for one in comparison.runs)[run.name]["color"]
@@ -129,13 +129,13 @@ def _inversion(comparison: Comparison) -> Drawing | None:
 
 
 def _band(axes: Axes, along: Sequence[float] | Floats, middle: Floats, bar: Floats) -> None:
-    """The error bars ``bar`` (f,) around ``middle`` (f,), ``along`` (f,) the axis."""
+    """Draw the error bars ``bar`` (f,) around the curve ``middle`` (f,) over ``along`` (f,)."""
     labelled = _KNOWN in axes.get_legend_handles_labels()[1]
     axes.fill_between(along, middle - bar, middle + bar, color=BAND, linewidth=0, label="_" if labelled else _KNOWN)
 
 
 def _line(axes: Axes, numbers: Sequence[float] | Floats, measure: Measure, label: str, **look: str | float) -> None:
-    """A measure over frames; a cross on the frame axis if the value is not finite."""
+    """Draw a measure over frames, with a cross on the axis at each frame whose value is not finite."""
     frames, values = np.asarray(numbers), np.asarray(measure.values, float)
     bad = ~np.isfinite(values)
     axes.plot(frames, np.where(bad, np.nan, values), label=label, **look)  # type: ignore[arg-type]

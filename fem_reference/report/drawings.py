@@ -133,7 +133,7 @@ def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], 
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
-    """Add a legend above in as many columns as fit, with the mark of NaN last; with more than three rows the figure grows."""
+    """Add a legend above in as many columns as fit, with the entry for NaN last; with more than three rows the figure grows."""
     entries = sorted(zip(*axes.get_legend_handles_labels(), strict=True), key=lambda entry: entry[1] == NOT_A_NUMBER)
     handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
     lengths = [len(label) + 7 for label in labels]
@@ -170,7 +170,7 @@ def plain_numbers(axis: Any) -> None:
 
 
 def inline(svg: str, name: str, title: str) -> str:
-    """The ``<svg>`` element alone, as wide as its place; ids begin with ``name``, and the page may set named colours."""
+    """The ``<svg>`` element alone, as wide as its container; ids begin with ``name``, and the page may set named colours."""
     name = re.sub(r"[^\w.-]", "_", name)
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg).replace("xlink:href", "href")

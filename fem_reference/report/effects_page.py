@@ -19,7 +19,7 @@ MAIN = "surface_deviation.rms"
 HEADS = {
     ".".join(key): f"{one.title} ({one.part})".removesuffix(" ()").lower() for key, one in described("main").items()
 }
-# The axis ends at this factor below the least change that counts; smaller changes are drawn at its end, with their value.
+# The axis ends below the least change that counts, by this factor; smaller changes are drawn at its end, with their values.
 _DEPTH = 10.0
 
 
@@ -53,7 +53,7 @@ def label(ablation: Ablation, omission: Omission) -> str:
 
 
 def percent(share: float) -> str:
-    """A share of the whole.
+    """A fraction as a percentage.
 
     >>> percent(0.254)
     '25 %'

@@ -50,8 +50,8 @@ def said(found: Estimation) -> str:
     if fits := [one for one in found.fits if one.gaussians == most]:
         sentences.append(
             f"{most} Gaussians deviate from a muscle's surface by "
-            f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms, with numbers fewer by a factor of "
-            f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f}"
+            f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms, with "
+            f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer numbers"
         )
     return "; ".join(sentences) or "nothing was measured"
 
@@ -103,7 +103,7 @@ def _curves(found: Estimation) -> Drawing:
 
 
 def two_blobs(apart: float, size: int = 161) -> tuple[Floats, Floats, Floats]:
-    """Coordinates along (n,) and across (m,) a plane, and the level (m, n) there of two Gaussians of radius 1, positive inside."""
+    """Coordinates along (n,) and across (m,) in a plane, and the level (m, n) of two Gaussians of radius 1, positive inside."""
     along, across = np.linspace(-1.4, 1.4, size), np.linspace(-1, 0.8, size)
     x, y = np.meshgrid(along, across)
     surface = GaussianSurface(np.array([[-apart / 2, 0, 0], [apart / 2, 0, 0]]), np.ones(2))
@@ -126,7 +126,7 @@ def _blobs() -> Drawing:
 
 
 def _fits(found: Estimation) -> Drawing:
-    """Errors of implicit surfaces against the number of Gaussians, by case."""
+    """Errors of implicit surfaces against the number of Gaussians, for each case."""
 
     def draw(_: Figure, axes: Axes) -> None:
         for i, case in enumerate(dict.fromkeys(one.case for one in found.fits)):

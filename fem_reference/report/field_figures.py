@@ -81,15 +81,15 @@ def _lines(example: Comparison) -> list[Drawing]:
 
 
 def _distances(example: Comparison, known: list[Run]) -> Drawing:
-    """The distance of every run from the exact solution at the nodes, or of the candidates from the reference."""
+    """The difference of every run from the exact solution at the nodes, or of the candidates from the reference."""
     exact, runs, base = example.setup.exact, known, example.reference.vertex_values[-1]
     if exact is not None:
-        base, title = at(exact, example.setup.mesh.points), "Distance to the exact solution at the nodes"
+        base, title = at(exact, example.setup.mesh.points), "Difference from the exact solution at nodes"
     else:
-        runs, title = [run for run in known if run is not example.reference], "Distance to the reference at the nodes"
+        runs, title = [run for run in known if run is not example.reference], "Difference from the reference at nodes"
     apart = [np.abs(run.vertex_values[-1] - base) for run in runs]
     if not any(np.isfinite(values).all() and values.max() > 0 for values in apart):
-        return Drawing(title, missing="it is zero everywhere, or not a number")
+        return Drawing(title, missing="the difference is zero everywhere, or not a number")
 
     def draw(axes: Axes) -> None:
         for run, values in zip(runs, apart, strict=True):
@@ -178,7 +178,7 @@ def _plate(figure: Figure, example: Comparison, values: Floats, scale_of: Floats
 
 
 def _scale(values: Floats, colours: str) -> Normalize:
-    """The colour scale from the least to the greatest value; for differences, symmetric about zero."""
+    """The colour scale from the minimum to the maximum; for differences, symmetric about zero."""
     low, high = float(values.min()), float(values.max())
     if colours == DIFFERENCES:
         high = max(-low, high)
@@ -204,7 +204,7 @@ class _Window:
 
 
 def _windows(points: Floats, anchors: Floats) -> list[_Window]:
-    """The windows: the entire surface, the belt about its mean height, and the part about its anchors (k, 3)."""
+    """The windows: the entire surface, the belt around its mean height, and the part around its anchors (k, 3)."""
     height, extent = float(np.ptp(points[:, 1])), float(np.ptp(points, axis=0).max())
     windows = [_Window("whole", points.min(axis=0), points.max(axis=0), 0.0)]
     belt = points[np.abs(points[:, 1] - points[:, 1].mean()) < 0.1 * height]

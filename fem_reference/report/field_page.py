@@ -14,7 +14,7 @@ from fem_reference.report.tables import MEASURES, as_csv, summary
 from fem_reference.report.words import number
 from fem_reference.runs.store import Run
 
-AGREE = 1e-9  # a difference below this share of the greatest value is rounding
+AGREE = 1e-9  # a difference below this fraction of the maximum is rounding
 
 
 def page(title: str, examples: tuple[Comparison, ...]) -> Page:
@@ -63,28 +63,28 @@ def apart(example: Comparison) -> str:
     distance = float(np.abs(other.vertex_values[-1] - reference.vertex_values[-1]).max())
     size = float(np.abs(reference.vertex_values[-1]).max())
     if distance <= AGREE * size:
-        return f"{name} and the equation agree; their greatest difference at a vertex is {number(distance)}."
+        return f"{name} and the equation agree; their maximum difference at a vertex is {number(distance)}."
     (low, high), (least, greatest) = bounds(other), bounds(reference)
     compared = (
-        f"{number(distance / size)} times the greatest value of the equation's solution"
+        f"{number(distance / size)} times the maximum of the equation's solution"
         if size
         else "and the equation gives zero"
     )
     return (
         f"{name} gives {number(low)} to {number(high)}, the equation {number(least)} to {number(greatest)}; "
-        f"their greatest difference at a vertex is {number(distance)}, {compared}."
+        f"their maximum difference at a vertex is {number(distance)}, {compared}."
     )
 
 
 def bounds(run: Run) -> tuple[float, float] | tuple[None, None]:
-    """The least and the greatest value at a vertex, NaN if any value is not a number; None if the run failed."""
+    """The minimum and the maximum over the vertices, NaN if any value is not a number; None if, in addition, the run failed."""
     if _lost(run):
         return None, None
     return float(run.vertex_values[-1].min()), float(run.vertex_values[-1].max())
 
 
 def _lost(run: Run) -> bool:
-    """True for a run that failed and has no values that are numbers."""
+    """True for a run that failed and has a value that is not a number."""
     return run.outcome.status != "converged" and not np.isfinite(run.vertex_values[-1]).all()
 
 

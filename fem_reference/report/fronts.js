@@ -36,7 +36,7 @@
     return { at, ticks };
   }
 
-  function front(points, error, cost, bar) { // pairs [cost, error] that no other pair beats in both, the cheapest first; errors below the bar count as equal
+  function front(points, error, cost, bar) { // pairs [cost, error] than which no pair has both a lower cost and a lower error, the cheapest first; errors below the bar count as the bar
     let best = Infinity;
     return points.map(point => [point.costs[cost], Math.max(point.errors[error], bar)])
       .sort((a, b) => a[0] - b[0] || a[1] - b[1])
@@ -57,7 +57,7 @@
     if (bar > 0) {
       const top = y.at(bar);
       svg.append(element("rect", { x: LEFT, y: top, width: W - RIGHT - LEFT, height: Math.max(0, H - BOTTOM - top), fill: "#8883" }));
-      svg.append(element("text", { x: LEFT + 6, y: H - BOTTOM - 6, "font-size": 12, fill: "currentColor" }, "below its error bar the truth is not known"));
+      svg.append(element("text", { x: LEFT + 6, y: H - BOTTOM - 6, "font-size": 12, fill: "currentColor" }, "error bar of the truth"));
     }
     for (const value of x.ticks) {
       svg.append(element("line", { x1: x.at(value), x2: x.at(value), y1: TOP, y2: H - BOTTOM, stroke: "#8884" }));

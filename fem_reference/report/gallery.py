@@ -85,12 +85,12 @@ def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes
 
 
 def top(wanted: list[Shot]) -> float:
-    """The end of the colour scale of all pictures [mm]: the greatest distance in any picture."""
+    """The end of the colour scale of all pictures [mm]: the maximum distance in any picture."""
     return max((float(shot.distances.max()) for shot in wanted if shot.distances is not None), default=0.0)
 
 
 def ticks(top: float) -> list[tuple[float, float]]:
-    """Round values from 0 to ``top`` with their share of it, and ``top`` itself.
+    """Round values from 0 to ``top``, and ``top`` itself, each after its ratio to ``top``.
 
     >>> ticks(4.6)
     [(0.0, 0.0), (0.217, 1.0), (0.435, 2.0), (0.652, 3.0), (1.0, 4.6)]
@@ -130,7 +130,7 @@ def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
 
 
 def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
-    """True if bones given in closed form hide most of ``points`` (n, 3) within four times ``view`` (3,), towards the camera."""
+    """True if bones given in closed form hide most of ``points`` (n, 3), seen from a distance of four times ``view`` (3,)."""
     behind = np.zeros(len(points), bool)
     for solid in (bone.solid for bone in bones if bone.solid is not None):
         for step in np.arange(1, 17) / 4:

@@ -74,7 +74,7 @@ def _number(value: float) -> str:
 
 
 def _worst(result: Comparison) -> list[str]:
-    """The worst deviations of each candidate in a line, in the statistics of the page's first table; for fields, all numbers."""
+    """A line for each candidate with its worst deviations in the ``PRINTED`` statistics; for fields, a line for each number."""
     if "field" in result.reference.carries:
         measured = {"reference": result.changes["reference"]} | result.deviations
         return [line for name, measures in measured.items() for line in _measured(name, measures)]
@@ -93,7 +93,7 @@ def _known(result: Comparison) -> list[str]:
     """Error bars of the reference, one line for each statistic; no lines without error bars."""
     if result.error_bars is None:
         return []
-    lines = ["error bars of the reference (its greatest change from rest, and the widest error bar of that change):"]
+    lines = ["error bars of the reference (the maximum change from rest, and the widest error bar of this change):"]
     for measure in (*result.changes[result.reference.name], *exerted(result.reference)):
         bar = result.error_bars.find("change", measure.metric, measure.statistic)
         if bar is not None:

@@ -31,7 +31,7 @@ from fem_reference.report.words import duration, listed, number, ratio, title_of
 _FACTS, _ASKED = "<!-- facts of the page -->", "<!-- what was asked -->"
 _BEGIN, _END = '<script type="application/json" id="page-facts">', "</script>"
 _HEAD = 2**17  # the number of bytes at the beginning of a file that are searched for the facts
-_SIDE = 160  # the greatest width and height of the thumbnail [pixels]
+_SIDE = 160  # the maximum width and height of the thumbnail [pixels]
 _PICTURE = re.compile(r'src="data:image/webp;base64,([A-Za-z0-9+/=]+)"')
 Headlines = tuple[tuple[str, str, str], ...]
 

@@ -4,7 +4,7 @@ It is a separate process, as VTK ends the drawing process without an exception i
 
 The job has ``top``, the end of the colour scale [mm]; ``triangles`` (m, 3); ``directions`` (2, 3) towards the two cameras; points
 and triangles of each of the ``bones``; and ``shots``: ``points`` (n, 3), ``poses`` of the bones (4, 4), ``distances`` (n,) [mm] to
-colour by, and ``outline`` (n, 3), a body whose outline is drawn on top, both or None. View k of shot i becomes ``i_k.webp``.
+colour by, and ``outline`` (n, 3), a body whose outline is drawn on top (both or None). View k of shot i is written to ``i_k.webp``.
 """
 
 import pickle
@@ -74,7 +74,7 @@ def _view(job: dict[str, Any], shot: dict[str, Any], bones: list[Any], direction
 
 
 def _camera(points: NDArray[Any], frame: NDArray[Any], direction: NDArray[Any]) -> dict[str, Any]:
-    """A parallel camera that looks from ``direction`` at the body ``frame``, wide enough for ``points`` unless they scatter."""
+    """A parallel camera that looks from ``direction`` at the body ``frame``, and sees ``points`` within twice the body's size."""
     middle = (frame.max(axis=0) + frame.min(axis=0)) / 2
     own, both = (float(np.linalg.norm(cloud - middle, axis=1).max()) for cloud in (frame, np.vstack([frame, points])))
     up = (0.0, 0.0, 1.0) if abs(direction[2]) < 0.95 else (0.0, 1.0, 0.0)

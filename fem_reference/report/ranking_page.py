@@ -106,7 +106,7 @@ def _drawing(table: Table) -> Drawing:
         logarithmic(axes)
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.set(xlabel="time for a frame number, ms", ylabel="% of the greatest displacement")
+        axes.set(xlabel="time for a frame number, ms", ylabel="% of the maximum displacement")
         handles = [axes.plot([], [], "o", color=one["color"], label=name)[0] for name, one in colours.items()]
         handles += [axes.plot([], [], mark, color="#777777", label=case)[0] for case, mark in marks.items()]
         figure.legend(handles=handles, loc="outside right upper")

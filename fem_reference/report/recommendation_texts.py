@@ -107,7 +107,7 @@ def _parts(one: Expected, unit: str, *, measured: bool) -> str:
     if not one.bar > 0:
         return " (as measured: the truth has no error bar)"
     if one.point.is_truth:
-        return " (the truth itself, by its error bar)"
+        return " (the error bar of the truth itself)"
     return f" ({number(one.error - one.bar)} {unit} measured, and {number(one.bar)} {unit}, the error bar of the truth)"
 
 

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 from fem_reference.assessment.regression import WORST_FIRST, Check, Judgement, Question
 from fem_reference.io.texts import finite
 
-# The greatest number of judgements listed in a text; the others are only counted.
+# The maximum number of judgements listed in a text; the others are only counted.
 MOST_ROWS = 15
 _COLUMNS = ("verdict", "question", "statistic", "frame", "was", "now", "allowed", "error bar")
 
@@ -125,7 +125,7 @@ def _named(one: Judgement) -> str:
 def _most(lines: list[str]) -> list[str]:
     """The first ``MOST_ROWS`` of ``lines``, and the number of the others."""
     more = len(lines) - MOST_ROWS
-    return [*lines[:MOST_ROWS], f"and {more} more like the last, listed by --json and --junit"] if more > 0 else lines
+    return [*lines[:MOST_ROWS], f"and {more} more, listed by --json and --junit"] if more > 0 else lines
 
 
 def _few(names: list[str]) -> str:

@@ -50,7 +50,7 @@ def text(found: Stress) -> str:
 
 
 def picture(scene: Scene) -> str:
-    """The body as an image: triangles lit from the camera, blue where their inner side is visible; a ring marks the place."""
+    """The body as an image: triangles lit from the camera, blue where the inner side is visible, and a ring at ``scene.place``."""
     forward = _VIEW / np.linalg.norm(_VIEW)
     right = np.cross(forward, [0, 0, 1.0])
     right /= np.linalg.norm(right)
@@ -85,8 +85,8 @@ def _colour(facing: float) -> tuple[int, int, int]:
 
 
 def history(of: History, bound: float) -> dict[str, Any]:
-    """The drawing of a quantity over frames: the title, the ``points``, the places of frames without a number (``lost``), the
-    height of the ``limit`` of a healthy run, and both ends of each axis; logarithmic if the values span decades.
+    """The drawing of a quantity over frames: the title, the ``points``, the positions of frames without a number (``lost``), the
+    height of the bound (``limit``), and both ends of each axis; logarithmic if a value exceeds 30 times the ``bound``.
     """
     values = np.asarray(of.values, float)
     known = np.isfinite(values)

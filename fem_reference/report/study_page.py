@@ -25,7 +25,7 @@ from fem_reference.report.words import title_of as in_words
 
 REFERENCE = "fenicsx"
 TIME = "seconds_per_frame"
-# The statistic in the tables, and the quantities at equal values of which solvers are compared.
+# The statistic in the tables, and the costs in which solvers are made equal to compare their errors.
 MAIN = next(map(".".join, described("rank")))
 MATCHED = (TIME, "peak_memory_mb", "unknowns")
 
@@ -103,7 +103,7 @@ def _sentence(one: Price, unit: str, bar: float) -> str:
     reach = f"{one.count} settings, from {number(one.worst)} {unit} to {best} with {label}, {time} a frame"
     if one.factor > 1:
         verb = "costs" if one.is_measured else "would cost"
-        return f"To halve the error of {one.solver} {verb} {number(one.factor)} times the time ({reach})."
+        return f"Halving the error of {one.solver} {verb} {number(one.factor)} times the time ({reach})."
     if one.count > 1:
         return f"More time hardly improves {one.solver} ({reach})."
     return f"One setting of {one.solver} is the fastest and the most accurate: {best} with {label}, {time} a frame."
@@ -125,7 +125,7 @@ def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Mat
 
 
 def answered(case: CaseStudy) -> tuple[Answer, ...]:
-    """The answers to the usual requests, by the settings that the verb recommend considers; none for a case without settings."""
+    """The answers to the usual requests, from the settings that the verb recommend considers; none for a case without settings."""
     known = known_settings(case.features, case.case, [case], MAIN).settings
     return answers(known) if known else ()
 

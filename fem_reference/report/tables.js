@@ -22,7 +22,7 @@
     return Number(found[1]) * 10 ** raised * (SCALE[found[3]] ?? 1);
   }
 
-  function groups(body) { // each row with the rows that continue it
+  function groups(body) { // each row with the rows of class "more" below it
     const found = [];
     for (const row of body.rows) row.classList.contains("more") && found.length ? found.at(-1).push(row) : found.push([row]);
     return found;

@@ -25,7 +25,7 @@ DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in describ
 # The same springs at points of the surface and over facets of the tetrahedra, on gluteus_medius and gluteus_maximus at 1 rad.
 SPREAD = (
     "Attachments are springs, and 5 to 9 % of a force or moment depend on how the same springs are spread over them (5.3 and "
-    "8.8 % on two muscles of the hip): error bars of forces and moments exclude this effect and report it as that of another model"
+    "8.8 % for two hip muscles): error bars of forces and moments exclude this effect, which is reported as that of another model"
 )
 
 
@@ -85,7 +85,7 @@ def known(comparison: Comparison) -> tuple[ErrorBar, ...]:
 
 
 def spread(comparison: Comparison) -> str:
-    """The sentence on the part that error bars of forces leave out; empty without such bars or without springs."""
+    """The sentence on the effect that error bars of forces exclude; empty without error bars of forces or without springs."""
     forces = any(bar.metric == "joint_moment" for bar in known(comparison))
     return SPREAD if forces and any(one.stiffness is not None for one in comparison.setup.attached) else ""
 

@@ -21,7 +21,7 @@ from fem_reference.report.words import duration, number, words
 _OF_ENTRY = ("name", "group", "title", "unit", "kind", "relative", "because", "source", "negative_control")
 _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
 PASS, FAIL = "#14713a", "#b3261e"
-LEAST, GREATEST = 1e-8, 1e3  # the range of shares of the tolerance in the overview; others are drawn at the edge
+LEAST, GREATEST = 1e-8, 1e3  # the range of error / tolerance in the overview; values outside it are drawn at the edge
 _ROW = 0.175  # height of a row of the overview [in]
 
 
@@ -91,7 +91,7 @@ def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
 
 
 def share(one: Result) -> float:
-    """The error divided by its bound; NaN if nothing was measured, infinite for an error if no error is allowed."""
+    """The error divided by its tolerance; NaN if nothing was measured, infinite for an error if no error is allowed."""
     if one.within > 0:
         return one.error / one.within
     return one.error * math.inf if one.error else 0.0
@@ -123,7 +123,7 @@ def overview(groups: dict[str, list[Result]]) -> Drawing:
 
 
 def _dot(axes: Axes, row: int, one: Result, limits: tuple[float, float]) -> None:
-    """Draw the error of a result by its tolerance: a hollow triangle if it is beyond the edge, a cross if it is not a number."""
+    """Draw error / tolerance of a result: a hollow triangle if it is beyond the edge, a cross if it is not a number."""
     low, high = limits
     value = share(one)
     look: dict[str, Any] = {"color": PASS if one.word == "pass" else FAIL, "clip_on": False, "markersize": 5.5}

@@ -25,7 +25,7 @@ async function library(files) {
   return { ...(await import(main)), ...(await import(controls)) };
 }
 
-// Whole numbers (frames, vertices, 3), from differences to the frame before, zigzag, low bytes before high bytes.
+// Integers (frames, vertices, 3), from differences from the previous frame, zigzag, low bytes before high bytes.
 async function wholeNumbers(text, frames) {
   const bytes = new Uint8Array(await unpacked(text));
   const count = bytes.length / 2, stride = count / frames;
@@ -129,7 +129,7 @@ function isOn(name) {
   return part(name)?.checked ?? false;
 }
 
-// The panes of the picture: the reference and the candidates chosen, or these alone with the reference laid over them.
+// The panes of the picture: the reference and the chosen candidates, or only the candidates, each with the reference laid over it.
 function panes() {
   const candidates = chosen();
   return isOn("laid") && candidates.length ? candidates : [view.runs[0], ...candidates];

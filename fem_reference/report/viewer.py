@@ -5,10 +5,10 @@
     library    text of each file of three.js
     frames     numbers (f,) of the frames drawn;  colours, both, warm  stops of the colour bars: for magnitudes, for signed values
                and for fibres
-    low, step  position = low + step * whole number from 0 to 65535 [mm]
-    triangles  whole numbers (m, 3), of 4 bytes, the same for every run
+    low, step  position = low + step * integer from 0 to 65535 [mm]
+    triangles  integers (m, 3), of 4 bytes, the same for every run
     runs       name, worst (greatest distance to the reference [mm] and its frame's index), reached (f,), off (f,): number of
-               vertices outside the box, and positions: whole numbers (f, n, 3) of 2 bytes as differences from the previous
+               vertices outside the box, and positions: integers (f, n, 3) of 2 bytes as differences from the previous
                frame, zigzag (0, -1, 1, -2, ... as 0, 1, 2, 3, ...), all low bytes before all high bytes
     bones      name, triangles, positions (1, n, 3) in the same form with its own low and step, poses (f, 16) by rows
     force      the greatest force drawn [N];  attached  numbers of the vertices attached to bones
@@ -56,7 +56,7 @@ class _Box:
         return cls(low, max(float((high - low).max()) / _LEVELS, 1e-9))
 
     def whole(self, points: Floats) -> NDArray[np.uint16]:
-        """The nearest whole numbers; 0 for NaN, the edge of the box for points outside it."""
+        """The nearest integers; 0 for NaN, the edge of the box for points outside it."""
         with np.errstate(invalid="ignore", over="ignore"):
             steps = np.clip(np.round((points - self.low) / self.step), 0, _LEVELS)
         return np.nan_to_num(steps, nan=0.0).astype(np.uint16)
@@ -68,8 +68,8 @@ class _Box:
 def view(comparison: Comparison, budget: int = BUDGET) -> dict[str, Any]:
     """The contents of the template of the 3D view. ``data``: for the script; ``candidates``, ``quantities``: their names.
     ``numbers``: frame numbers. ``every``: the stride of frames drawn, above 1 if positions would exceed ``budget`` bytes.
-    ``error``: the greatest error of a coordinate [mm]. ``warm``: the colours of fibres; ``stretches``: places on their scale [%].
-    ``force``: the greatest force drawn [N], 0 without forces. ``attached``, ``touched``: True with such vertices; ``near``: the
+    ``error``: the greatest error of a coordinate [mm]. ``warm``: colours of fibres; ``stretches``: labels of their scale.
+    ``force``: the greatest force drawn [N], 0 without forces. ``attached``, ``touched``: True if such vertices exist; ``near``: the
     distance [mm] of touched vertices. ``version``, ``licence``: of the library.
     """
     shown = [comparison.reference, *(run for run in comparison.candidates if run.has_surface)]
@@ -135,7 +135,7 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
 
 
 def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:
-    """The places on a scale [%] that get a label: its ends, and rest unless it is near an end."""
+    """The positions [%] and values of labels on the scale of stretches: its ends, and rest unless it is near an end."""
     low, high = fibres["low"], fibres["high"]
     rest = 100 * (1 - low) / ((high - low) or 1.0)
     middle = ((rest, 1.0),) if 12 < rest < 88 else ()
@@ -157,7 +157,7 @@ def _frames(run: Run, numbers: tuple[int, ...]) -> Floats:
 
 
 def _box(reference: Floats, runs: list[Floats]) -> _Box:
-    """The box around all frames, but at most one diagonal larger on each side than that of the reference, as a run may scatter."""
+    """The box around all frames. As runs may scatter, it exceeds the reference's box by at most one diagonal on each side."""
     low, high = _bounds(reference)
     reach = float(np.linalg.norm(high - low))
     lows, highs = zip(*(_bounds(frames) for frames in [reference, *runs] if np.isfinite(frames).any()), strict=True)

@@ -4,7 +4,7 @@ quantities  name, signed, and top, the greatest magnitude [mm]: value = sign * t
 runs        levels by quantity: (f, n) of one byte, as differences from the previous frame; most: the greatest magnitude by
             quantity and frame; points: of the fibres, as positions
 bars        error bar [mm] of the reference by quantity and frame; null where it is unknown, absent without bars
-fibres      lines (k,): number of points of each; rest: length [mm] of each piece, line by line; low, high: ends of all stretches
+fibres      lines (k,): number of points of each; rest: length [mm] of each piece, line by line; low, high: range of stretches
 touched     for each run that touches a bone (f, n) of one byte: 1 within ``NEAR`` of a bone, except for attached vertices
 forces      arrows of each run by frame: point of application [mm] and force on a bone [N], six numbers each
 joints      name, unit, and angle or distance by frame of each bone that moves
@@ -134,7 +134,7 @@ class Fields:
         return found
 
     def fibres(self, points: list[Floats]) -> dict[str, Any]:
-        """The lines, and the least and greatest stretch of a piece of them at ``points`` (f, m, 3) [mm] of each run."""
+        """The lines, and the range of stretches of their pieces, without extremes, at ``points`` (f, m, 3) [mm] of each run."""
         lines, ends = self.lines[0], self.lines[0].offsets
         # A piece joins a point of a line to the next one.
         inside = np.delete(np.arange(max(len(lines.points) - 1, 0)), ends[1:-1] - 1)

@@ -1,5 +1,5 @@
 // Marks of a muscle: vertices that are attached to bones, and vertices that touch bones. Part of viewer.js.
-const ATTACHED = "#e0218a", TOUCHED = "#101014", PLATE = 36; // corners of the twelve triangles of a box
+const ATTACHED = "#e0218a", TOUCHED = "#101014", PLATE = 36; // number of triangle corners of a box: a bone with at most as many is drawn as a plate
 
 async function marks(run, geometry) {
   const touched = run.touched ? new Uint8Array(await unpacked(run.touched)) : new Uint8Array(0);

@@ -1,9 +1,9 @@
 // Colours, scale and histogram of the quantities in the 3D view. Part of viewer.js.
-const FORCE = "#1f6fd1", LONGEST = 0.6; // of half the picture's height
+const FORCE = "#1f6fd1", LONGEST = 0.6; // length of the longest arrow, as a fraction of half the picture's height
 const BINS = 48, GREATEST_LEVEL = 127;
 const WORDS = { distance: "worst vertex", surface: "farthest from the surface", depth: "deepest in a bone" };
 
-// Levels of one byte (frames, vertices), from differences to the frame before.
+// Levels of one byte (frames, vertices), from differences from the previous frame.
 async function levels(text) {
   const bytes = new Int8Array(await unpacked(text)), stride = bytes.length / data.frames.length;
   for (let i = stride; i < bytes.length; i++) bytes[i] += bytes[i - stride]; // wraps at 256, as the differences did
@@ -80,7 +80,7 @@ function legend() {
   part("known").textContent = notes[chosen.name] ?? (bar > 0 ? `Grey: below the reference's error bar of ${number(bar)} mm.` : without);
 }
 
-// Bars over a scale: the mean of the shares in each bin.
+// Bars over a scale: the sum over the runs of the fraction in each bin, relative to the highest bar.
 function histogram(svg, all) {
   const means = Array.from({ length: BINS }, (_, i) => all.reduce((sum, bins) => sum + bins[i], 0));
   const most = Math.max(...means, 1e-9);

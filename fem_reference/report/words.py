@@ -8,7 +8,7 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float | None) -> str:
-    """A number with three significant digits; where these would round to 1000 or more, up to 10^7, a rounded integer.
+    """A number with three significant digits; from 1000 to 10^7 an integer.
 
     >>> number(0.12345), number(12.3456), number(0), number(float("nan"))
     ('0.123', '12.3', '0', 'not a number')
@@ -43,7 +43,7 @@ def duration(seconds: float | None) -> str:
 
 
 def under_load(shares: Iterable[float], most: float) -> str:
-    """A warning if other processes kept more than ``most`` of the machine busy while times were measured; NaN: unknown.
+    """A warning if other processes kept more than the fraction ``most`` of the machine busy during measurements; NaN: unknown.
 
     >>> under_load([0.02, 0.5, 0.25], 0.1)
     '2 of 3 times were measured while other processes kept 25 % to 50 % of the machine busy: undisturbed runs take less time'

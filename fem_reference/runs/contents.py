@@ -65,7 +65,7 @@ class Contents(Record):
 
     _check_scalars = rule(
         lambda one: all(len(values) == len(one.numbers) for values in one.scalars.values()),
-        "as many values of each of the scalars as there are frame numbers",
+        "as many values of each scalar as frame numbers",
     )
 
 

@@ -89,7 +89,7 @@ def machine() -> str:
 
 
 def made_with(manner: str = "") -> dict[str, str]:
-    """Provenance of a measurement: our version, the machine, the ``manner`` of its use by runs, and versions of packages."""
+    """Provenance of a measurement: our version, the machine, the ``manner`` in which runs use it, and versions of packages."""
     described = ", ".join(filter(None, [machine(), manner]))
     return {"fem_reference": __version__, "machine": described, **versions()}
 

@@ -39,7 +39,7 @@ NAMES = (
     "von_mises",
     "fibre_stress",
 )
-# A point counts as outside the tets if its distance from them exceeds this share of the mesh's diagonal; less is rounding.
+# A point counts as outside the tets if its distance from them exceeds this fraction of the mesh's diagonal; less is rounding.
 ROUNDING = 1e-9
 
 
@@ -263,7 +263,7 @@ class _Places:
 
 @cache
 def _rule() -> tuple[Floats, Floats]:
-    """Barycentric coordinates (27, 4) and shares (27,) of a conical product rule of degree 5 (Gauss-Jacobi; Stroud 1971)."""
+    """Barycentric coordinates (27, 4) and weights (27,) of a conical product rule of degree 5 (Gauss-Jacobi; Stroud 1971)."""
     (u, a), (v, b), (w, c) = (scipy.special.roots_jacobi(3, power, 0) for power in (2, 1, 0))
     x, y, z = np.meshgrid((1 + u) / 2, (1 + v) / 2, (1 + w) / 2, indexing="ij")
     rest = (1 - x) * (1 - y)

@@ -23,7 +23,7 @@ from fem_reference.runs.contents import frame_file
 
 FOLDER, FIELD = "state", "field"
 VALUES = "psi"  # the name of a field itself
-# The most memory [bytes] for the arrays of a file: a state of a million tetrahedra.
+# The maximum size [bytes] of the arrays in a file: that of a state of a million tetrahedra.
 MOST_BYTES = 2**30
 # The arrays of a file by name.
 Arrays = dict[str, NDArray[Any]]
@@ -149,7 +149,7 @@ def read_arrays(path: Path, names: tuple[str, ...] = (), also: tuple[str, ...] =
 
 @dataclass(frozen=True, eq=False)
 class NodalField:
-    """Arrays by name at the nodes of ``mesh``: ``psi`` (N,) at the vertices, then for elements of order 2 at the middles of
+    """Arrays by name at the nodes of ``mesh``: ``psi`` (N,) at the vertices, then for elements of order 2 at the midpoints of
     ``mesh.edges``. ``components`` (n, d) at the vertices: the vector whose norm is psi, if the solver computes it. ``form``: the
     weak form that was solved. After a failure psi is NaN.
     """

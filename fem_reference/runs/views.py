@@ -1,4 +1,4 @@
-"""Frames and runs of a single muscle, extracted from those of several muscles. Its scalars' names begin with its name and a dot."""
+"""Frames and runs of a single muscle, extracted from those of several muscles, in which its scalars have its name as a prefix."""
 
 from collections.abc import Mapping
 from dataclasses import replace

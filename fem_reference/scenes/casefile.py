@@ -28,7 +28,7 @@ def read(case: str | Path, *, with_negative_control: bool = False, changes: dict
     """A shipped case by name, or the case in a folder or a file; a case with a ``domain`` has a scalar field.
 
     ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values. ``with_negative_control`` applies the
-    negative control, which is checked in any case, except after changes of other keys.
+    negative control, which is checked even if it is not applied, except after changes of other keys.
     """
     path = _scene_file(case)
     table = texts.toml(path)

@@ -14,7 +14,7 @@ from fem_reference.scenes.muscle import Frames, MuscleCase
 
 # The name of the surface on which a load acts if it does not act on an attachment: the part that is not attached to bone.
 FREE = "free"
-# The stretch of fibres slightly beyond their given length.
+# The stretch of fibres slightly shorter than in the given shape.
 _GIVEN = 1 - 1e-5
 
 
@@ -80,7 +80,7 @@ def check_rest(case: MuscleCase) -> None:
 def _check_slack(case: MuscleCase) -> None:
     """Check that passive fibres pull in the given shape only if a stress at rest balances them."""
     for i, effect in enumerate(case.effects):
-        # Slightly beyond the given length, where laws have a kink.
+        # Slightly below the given length, at which laws may have a kink.
         pull = fibre_tension(effect.energy, _GIVEN) if isinstance(effect, PassiveFibres) else 0.0
         if not pull <= 0 and in_situ.among(case.effects) is None:
             want = 'slack fibres (an optimal_stretch of at least 1), or the effect "in_situ", which balances them'
@@ -102,7 +102,7 @@ def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, p
                 raise InputError(join(place, f"effect[{i}].friction"), f"{effect.friction:g}", want)
         if isinstance(effect, MuscleContact) and effect.own_normals and effect.friction is not None:
             got = f"true, with a friction of {effect.friction:g}"
-            raise InputError(join(place, f"effect[{i}].own_normals"), got, "no friction, which needs the nearest place")
+            raise InputError(join(place, f"effect[{i}].own_normals"), got, "no friction, which needs the nearest point")
         if isinstance(effect, Effect) and "interval" in effect.needs and frames.interval is None:
             want = f"the time from a frame number to the next, which effect[{i}] ({effect.title}) needs"
             raise InputError(join(place, "frames.interval"), "nothing", want)

@@ -112,7 +112,7 @@ class Rod(Record):
 
 class CaseBone(Record):
     """A rigid body: a ``surface`` in a file with coordinates in ``unit``, or exactly one of the closed forms; without ``motion``
-    it rests. ``distance_error``: the allowed root-mean-square error of the distance, near the surface and before smoothing.
+    it is fixed. ``distance_error``: the allowed root-mean-square error of the distance, near the surface and before smoothing.
     ``distance_rounding``: the standard deviation of a Gaussian filter of this distance, as flat triangles prevent smooth sliding.
     """
 

@@ -36,11 +36,11 @@ def is_of_body(reference: object, of: object) -> bool:
 
 
 def check_muscle(name: object, case: object, place: str = "muscle") -> None:
-    """Raise InputError at ``place`` unless ``name`` is one of several muscles of the ``case``, or empty for others."""
+    """Raise InputError at ``place`` unless ``name`` is one of several muscles of the ``case``, or empty for another case."""
     names = [one.name for one in case.muscle] if isinstance(case, MusclesCase) else []
     if name not in (names or [""]):
         got = f'"{name}"' if isinstance(name, str) else said(name)
-        raise InputError(place, got, f"one of {', '.join(names)}" if names else "none, without several muscles")
+        raise InputError(place, got, f"one of {', '.join(names)}" if names else "none for this case")
 
 
 def check_keys(keys: object) -> Sequence[str]:
@@ -93,7 +93,7 @@ def check_error_bars(bars: object, case: Case) -> None:
 
 
 def check_run(given: object, case: Case, place: str) -> None:
-    """Raise InputError unless ``given`` is a run and, if it names a case, a run of the ``case``."""
+    """Raise InputError unless ``given`` is a run of the kind of the ``case`` (muscle or field) and, if it names a case, of this."""
     run = check(given, Run, place, "a Run, such as solve and read_run return")
     scene, effects, place = run.origin.get("scene"), run.origin.get("effects"), f'{place} "{run.name}"'
     keys = {case.key}

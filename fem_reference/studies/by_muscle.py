@@ -22,7 +22,7 @@ ALONE = "Each candidate solves each muscle by itself, without the other muscles.
 @dataclass(frozen=True, eq=False)
 class ByMuscle:
     """Comparisons of the ``muscles`` of a case, by name. ``worst``: rows of a solver, two muscles in its run, the greatest depth
-    [mm] of their overlap, and its frame. ``lacking``: pairs of a candidate and a muscle that it lacks.
+    [mm] of their overlap, and its frame. ``lacking``: pairs of a candidate and a muscle of which it has no frames.
     """
 
     muscles: dict[str, Comparison]
@@ -37,7 +37,7 @@ class ByMuscle:
 
 
 def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, error_bars: bool = False) -> ByMuscle:
-    """A comparison for each muscle of a case with several: its part of the common reference, and candidates that solve it alone.
+    """A comparison for each of several muscles, between its part of the common reference and candidates that solve it alone.
     Recorded frames are read from folders named after the muscles; a candidate may lack some. With ``error_bars``, bars are
     computed; else stored ones are used.
     """
@@ -69,13 +69,13 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, err
 
 
 def split(bench: Bench[Case], reference: Run) -> dict[str, Run]:
-    """The run of each muscle by name, over all frames and beside the others, from the ``reference`` of all muscles."""
+    """The run of each muscle by name, over all frames and with the others as ``others``, from the ``reference`` of all muscles."""
     numbers = bench.scene.numbers
     return beside({name: complete(run, numbers) for name, run in bench.by_muscle(reference).items()})
 
 
 def of_part(entry: Candidate, place: str, muscle: str) -> Candidate:
-    """A candidate with its folder, if any, for one ``muscle``; InputError at ``place`` if it has no frames of this muscle."""
+    """A candidate with the folder, if any, of one ``muscle``; InputError at ``place`` if it has no frames of this muscle."""
     found = _own((entry, place), muscle)
     if found is None:
         want = f'a folder "{muscle}" in it, with the frames of this muscle'

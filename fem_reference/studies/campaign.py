@@ -45,7 +45,7 @@ class Workers:
             raise InputError("--workers", self.count, "1 or more")
 
     def __str__(self) -> str:
-        """The way in which runs were solved, for reports."""
+        """The manner in which runs are solved, for reports."""
         if self.address is not None:
             return "runs by the workers of a cluster"
         return "runs one after the other" if self.count == 1 else f"runs {self.count} at once"
@@ -121,7 +121,7 @@ def shared_bench(case: MuscleCase, store: Path) -> Bench[MuscleCase]:
 
 
 def _made(trial: Trial, store: Path) -> Made:
-    """A trial with its result; bad input or a missing package ends this trial alone."""
+    """A trial with its result; bad input or a missing package ends only this trial."""
     try:
         return Made(trial, solve(trial, store))
     except (InputError, MissingSoftware) as error:

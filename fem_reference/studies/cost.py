@@ -46,8 +46,8 @@ def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Col
 
 
 def stored(folder: Path) -> list[CaseStudy]:
-    """The studies below ``folder``, one for each case: preferably the one in the folder named after the case, with the points
-    of other studies against the same truth added, such as those of a user's own solver; InputError if there is none.
+    """The studies below ``folder``, one for each case, preferably from the folder named after the case. Points of other studies
+    against the same truth are added, such as those of a user's own solver. InputError if there is no study.
     """
     known = [(study, path.parent.name) for path in sorted(folder.glob(f"*/{FILE}")) for study in load(path)]
     found = dict[str, CaseStudy]()

@@ -67,7 +67,7 @@ def _shipped(shear: float) -> Material:
 def _fitted(
     material: Callable[[Sequence[float]], Material], to: Sequence[Quantity], start: Sequence[float], most: int = _MOST
 ) -> _Ended:
-    """The parameters, all above zero, of the ``material`` that best fits the quantities, found from ``start``."""
+    """The parameters, all above zero, with which the ``material`` best fits the quantities, iterated from ``start``."""
 
     def misses(logs: Floats) -> list[float]:
         made = material([float(one) for one in np.exp(logs)])

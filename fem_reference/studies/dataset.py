@@ -47,8 +47,8 @@ log = logging.getLogger(__name__)
 VERSION = "1.0.0"
 SHIPPED = ("hip_flexion",)  # cases with the project's own geometry, without anatomy under another licence
 INDEX = "dataset.json"
-_TEST = 0.25  # the share of poses, and of shapes, in the test part
-_SAME = 0.01  # shapes whose volume and principal moments differ by less than this share are one shape
+_TEST = 0.25  # the fraction of poses, and of shapes, in the test part
+_SAME = 0.01  # the relative difference of volume and principal moments below which shapes are the same
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ def arrays(bench: Bench[MuscleCase], run: Run) -> Arrays:
     """Arrays of a ``run`` by name: ``frames`` (f,), ``poses`` (f, b, 4, 4) of ``bones`` (b,), ``activation`` (f,); at rest
     ``points`` (n, 3), ``triangles``, ``tet_points`` (k, 3), ``tets``, ``fibre_points`` (m, 3), ``fibre_offsets``, ``fibre`` (t, 3),
     the direction in each tetrahedron; by frame ``positions`` (f, n, 3), ``fibre_positions`` (f, m, 3), ``tet_positions`` (f, k, 3)
-    [mm], Cauchy ``stress`` (f, t, 3, 3) [MPa] in the middle of each, and ``forces``, ``moments`` (f, b, 3) [N, N mm] on bones,
+    [mm], Cauchy ``stress`` (f, t, 3, 3) [MPa] at the centre of each, and ``forces``, ``moments`` (f, b, 3) [N, N mm] on bones,
     NaN if unknown; ``surface_bar`` (f,) [mm], the error bar of the surface, rms.
     """
     assert run.fibres is not None
@@ -231,7 +231,7 @@ def _same_poses(one: Arrays) -> Ints:
 
 
 def _same_shapes(points: Sequence[Floats], triangles: Sequence[Ints]) -> Ints:
-    """The group of each surface; surfaces of a group have the same volume and principal moments, in any place and orientation."""
+    """The group of each surface; surfaces of a group have equal volume and principal moments, at any position and orientation."""
     measures = []
     for at, faces in zip(points, triangles, strict=True):
         spread_out = np.linalg.eigvalsh(np.cov((at[faces].mean(axis=1)).T))

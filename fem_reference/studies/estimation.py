@@ -1,7 +1,7 @@
-"""The report's estimation techniques (chapter 3) on the fibres, attachments and surface of a case: errors by parameters.
+"""The report's estimation techniques (chapter 3) on the fibres, attachments and surface of a case, and their errors.
 
 The decompositions of a muscle into fibres (report 6.1.2) are also compared with each other: direction, length, points outside,
-crossings, and the reference's answer with each decomposition.
+crossings, and the result of the reference with each decomposition.
 """
 
 import logging
@@ -46,7 +46,7 @@ CENTRES, GAUSSIANS = (4, 9, 16, 25), (10, 30, 100)
 _ALONG = 1000  # the number of sample points of a curve
 _POLYNOMIAL = 3  # the number of terms of a plane
 LAPLACE = "Laplace field"
-# The statistics of an answer that fibres may change, and the fibre law for a case without one, which is that of hip_flexion.
+# The statistics of a result that fibres may change, and the fibre law for a case without one, which is that of hip_flexion.
 ANSWERS = (
     "surface_deviation.rms",
     "surface_deviation.max",
@@ -57,14 +57,14 @@ ANSWERS = (
 PULL = {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
 COUNT, CONTOURS, AROUND = 20, 20, 12
 NEAR = 0.2  # two fibres cross if they are nearer than this [mm] between their ends
-_ENDS = 0.1  # the share of a fibre left out at either end, where attachments bring fibres together
+_ENDS = 0.1  # the fraction of a fibre left out at either end, where attachments bring fibres together
 _SAMPLED = 400  # sample points of a fibre
 _SAMPLES = 20_000  # random points in the box around a muscle
 _OUTSIDE = 1e-3  # a point is outside the surface beyond this distance [mm]
 
 
 def estimate(cases: Iterable[MuscleCase], store: Path | None = None) -> Estimation:
-    """All techniques on all cases; with a ``store``, also the reference's answers with each decomposition."""
+    """All techniques on all cases; with a ``store``, also the results of the reference with each decomposition."""
     named = {case.name: case for case in cases}
     setups, missing = each(named, muscle.setup)
     curves, heights, fits = list[CurveError](), list[HeightError](), list[FitError]()
@@ -168,8 +168,8 @@ def of_decompositions(case: MuscleCase, rest: Setup) -> Iterator[DecompositionEr
 
 
 def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
-    """The reference's answer on a case with each source of fibres, together with its answer with the Laplace field and its error
-    bars. Fibre lengths are those of the lines of the Laplace field, carried by each surface.
+    """Differences of the reference's result with each source of fibres of a case from its result with the Laplace field, and error
+    bars of the latter. Fibre lengths are those of the lines of the Laplace field, carried by each surface.
     """
     # Without candidates, which other fibres may not suit.
     alone = case.model_copy(update={"candidate": ()})

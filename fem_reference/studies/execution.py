@@ -80,7 +80,7 @@ class Bench[C: Case]:
         return cast("Bench[MuscleCase]", self)
 
     def found[S: SolverChoice](self, choice: S, place: str) -> S:
-        """The ``choice`` with its folder, if any, as a path; a folder named by the scene must be allowed for the scene's files."""
+        """The ``choice`` with its folder, if any, as a path; a folder named in the scene must be one that the scene may read."""
         folder, named = choice.settings.get("folder"), choice in (self.scene.reference, *self.scene.candidate)
         if not isinstance(folder, str) or not (named or not Path(folder).is_absolute()):
             return choice
@@ -98,7 +98,7 @@ class Bench[C: Case]:
 
     @property
     def parts(self) -> "dict[str, Bench[MuscleCase]]":
-        """The bench of each muscle of a case with several, by name."""
+        """The bench of each muscle of a case of several muscles, by name; empty for another case."""
         scene = self.scene
         if not isinstance(scene, MusclesCase):
             return {}
@@ -117,8 +117,8 @@ class Bench[C: Case]:
         return {name: replace(one, origin=one.origin | {"scene": parts[name].scene.key}) for name, one in found.items()}
 
     def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
-        """Raise InputError if settings of the reference, of a candidate of the case (except recorded frames, which may come later)
-        or of the ``chosen`` solvers do not suit the case. The problem made from the case is checked only if it has to be solved.
+        """Raise InputError if settings do not suit the case: those of the reference, of a candidate of the case (except recorded
+        frames, which may come later) or of the ``chosen`` solvers. The problem of the case is checked only if it has to be solved.
         """
         if self.scene.parts:
             self.settings(self.scene.reference, "reference")

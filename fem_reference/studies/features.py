@@ -21,8 +21,8 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 # Measured on hip_flexion: processor time [s] of a Newton iteration with this number of unknowns, the exponent with which it grows,
 # and iterations per frame.
 _SECONDS, _UNKNOWNS, _EXPONENT, _ITERATIONS = 0.13, 5456, 1.15, 4
-# With contact between parts: iterations while the attachments move by the edge of a facet, which bounds the load steps (12 in
-# two_muscles, 23 with its larger tetrahedra, 31 in hip_four_muscles), and the processor time [s] that an iteration takes longer.
+# With contact between parts: iterations for a motion of the attachments by the edge of a facet, which bounds the load steps (12 in
+# two_muscles, 23 with its larger tetrahedra, 31 in hip_four_muscles), and the additional processor time [s] of an iteration.
 _PER_EDGE, _CONTACT = 15, 0.1
 
 
@@ -35,7 +35,7 @@ class ExpectedCost(NamedTuple):
 
 
 def expected(body: Body, settings: Record) -> ExpectedCost:
-    """The cost of a muscle as a ``body`` by FEniCSx with these ``settings``."""
+    """The expected cost of a muscle as a ``body``, solved by FEniCSx with these ``settings``."""
     assert isinstance(settings, BodySettings)  # the settings of FEniCSx
     count = resources.unknowns(body.mesh, settings.element)
     chosen = resources.planned(settings, body.mesh, math.inf)
@@ -67,7 +67,7 @@ def _travel(body: Body) -> float:
 
 def features(case: MuscleCase, setup: Setup) -> dict[str, float]:
     """``size`` [mm], the diagonal of the muscle's box; ``triangles``; ``motion`` [mm], the greatest displacement of an
-    attached vertex over the frames; ``contact``, the number of obstacles; ``bulk_to_shear`` and ``fibres_to_shear`` of the
+    attached vertex over the frames; ``contact``, the number of bones in contact; ``bulk_to_shear`` and ``fibres_to_shear`` of the
     material without its regions, 0 if it has none; ``tet_size`` [mm] and ``refinements`` of the reference.
     """
     points = setup.surface.points

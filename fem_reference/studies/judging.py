@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 _REFINEMENTS = {2: 5, 3: 3}  # the number of refinements, by the number of vertices of a cell
 _MOST_CELLS = 100_000
-_EXACT = 1e-9  # errors below this share of the solution are rounding, and show no order
+_EXACT = 1e-9  # errors below this fraction of the solution are rounding, and show no order
 
 
 def compare(

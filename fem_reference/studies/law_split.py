@@ -21,15 +21,15 @@ from fem_reference.studies.execution import Bench
 # Effects of a case that the law of a solver replaces.
 LAW = ("neo_hooke", "incompressible", "incompressible_penalty", "mooney_rivlin")
 PARTS = ("left out", "law", "mesh", "convergence")
-# The shear modulus, as a share of the bulk modulus, that is added to a law without shear stiffness at rest, whose equilibrium is
+# The shear modulus, as a fraction of the bulk modulus, that is added to a law without shear stiffness at rest, whose equilibrium is
 # not unique. It moves the end of a bar that turns by 1 rad by 0.02 mm; with a tenth of it, Newton's method may not converge.
 _WEAK = 1e-4
 
 
 @dataclass(frozen=True)
 class Split:
-    """The ``parts`` of an error and the ``total``, root mean squares [mm] over the surface at the ``frame`` at which the total is
-    greatest, ``surface_deviation.rms``; the sum of the parts bounds it.
+    """The ``parts`` of an error and the ``total`` (``surface_deviation.rms``), root mean squares [mm] over the surface at the
+    ``frame`` at which the total is greatest; the sum of the parts is at least the total.
     """
 
     frame: int
@@ -89,13 +89,13 @@ def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -
 
 def _check_held(bench: Bench[MuscleCase]) -> None:
     """Raise InputError if exact attachments would differ too much from the case: it has none, or springs whose stiffness times the
-    muscle's size is below its shear modulus.
+    size of the muscle is below the shear modulus of the muscle.
     """
     case, size = bench.scene, diagonal(bench.setup().surface.points)
     soft = [one.name for one in case.attachment if (one.stiffness or math.inf) * size < moduli(case.effects).shear]
     if soft or not case.attachment:
         got = f"springs softer than the muscle: {', '.join(soft)}" if soft else "nothing"
-        raise InputError(f"{case.place}: attachment", got, "attachments that a solver can hold exactly")
+        raise InputError(f"{case.place}: attachment", got, "attachments stiff enough to be made exact")
 
 
 def _apart(one: Run, other: Run, i: int) -> float:

@@ -1,4 +1,4 @@
-"""Making of a run: its folder is locked, frames are stored as they are reached, and omitted effects are watched."""
+"""The making of a run: its folder is locked, frames are stored as they are reached, and omitted effects are watched."""
 
 import logging
 import math
@@ -38,7 +38,7 @@ class OvertimeError(Exception):
 
 @dataclass(frozen=True)
 class Wanted:
-    """A run that is wanted: its ``name`` on pages, its solver and settings, and the ``folder`` in which it is stored."""
+    """A requested run: its ``name`` on pages, its solver and settings, and the ``folder`` in which it is stored."""
 
     name: str
     choice: SolverChoice
@@ -47,7 +47,7 @@ class Wanted:
     folder: Path
 
     def stored(self, ended: tuple[str, ...]) -> Run | None:
-        """The stored run, if its status is in ``ended``; None if it was made with other packages or lacks wanted states."""
+        """The stored run, if its status is in ``ended``; None if it was made with other packages or lacks requested states."""
         run = store.finished(self.folder, ended)
         if run is None:
             return None

@@ -19,7 +19,7 @@ from fem_reference.scenes.muscle import Keyframe, MuscleCase
 from fem_reference.studies.campaign import each
 from fem_reference.studies.execution import Bench
 
-LARGER = 1.25  # factor on the size of tetrahedra in a second run, which shows how far moment arms depend on it
+LARGER = 1.25  # ratio of tetrahedron sizes in a second and the first run, which shows the dependence of moment arms on the size
 _EVERY, _RAD = 10, 100  # frame numbers from one frame to the next, and for a turn of a bone by 1 rad
 NEMETH, BLEMKER = "nemeth_1985", "blemker_delp_2005"
 # Flexion [rad]: that of the shipped cases, and from -10 to 90 degrees, or as far as a reference converges.
@@ -57,7 +57,7 @@ def beside(store: Path) -> tuple[tuple[ArmsBeside, ...], dict[str, str]]:
 
 
 def of_case(wanted: ArmStudy, store: Path) -> Iterator[ArmsBeside]:
-    """The moment arms of a case compared with each of its experiments, as far as its run went; InputError if below 1 rad."""
+    """The moment arms of a case compared with each of its experiments, up to its last angle; InputError if that is below 1 rad."""
     scene = casefile.read_muscle(wanted.case)
     (angles, arms), (others, larger) = (_arms(wanted, size * wanted.tet_size, store) for size in (1.0, LARGER))
     common = min(len(angles), len(others))  # both runs begin at the same angle
@@ -103,7 +103,7 @@ def coarse(scene: MuscleCase, tet_size: float, flexion: tuple[float, float]) -> 
 
 
 def flexion_arms(run: Run, bench: Bench[MuscleCase]) -> tuple[Floats, Floats]:
-    """Flexion angles (a,) [deg], opposite to the joint's angle about the axis to the left, and flexion moment arms (a, k) [mm]."""
+    """Flexion angles (a,) [deg], the negative joint angles about an axis to the left, and flexion moment arms (a, k) [mm]."""
     context = context_of(bench.setup(), run)
     if len(context.joints) != 1:
         raise InputError(bench.scene.name, f"{len(context.joints)} joints", "one joint")

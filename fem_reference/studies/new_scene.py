@@ -22,11 +22,11 @@ from fem_reference.scenes import casefile
 
 # The units among which the unit of files is guessed: those of LENGTH_UNITS that scanners and modelling programs write.
 _GUESSED = ("mm", "cm", "m", "in")
-# The range of lengths of muscles and bones [mm]: a unit that gives another length is ruled out.
+# The range of lengths of muscles and bones [mm]: a unit that gives a length outside it is ruled out.
 _LONG = {"muscle": (20.0, 700.0), "bone": (5.0, 2500.0)}
-# The greatest distance of a muscle from its bones, in lengths of the muscle; at a greater distance the files do not fit together.
+# The maximum distance of a muscle from its bones, relative to its length; beyond it the files do not fit together.
 _APART = 0.5
-# The share of vertices that are attached, those nearest to a bone; it is reduced if two attachments would share vertices.
+# The fraction of vertices that are attached, those nearest to a bone; it is reduced if two attachments would share vertices.
 _ATTACHED = (0.06, 0.04, 0.025, 0.015, 0.008)
 _TETS, _REFINEMENTS = 5000, 1
 _LONGEST = 60  # the number of characters that are kept of a name that is unfit for a scene or a file
@@ -131,7 +131,7 @@ def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
         units = [unit for unit in _GUESSED if least <= size * LENGTH_UNITS[unit] <= most]
         fitting.append(set(units))
         name = _cleaned(Path(surface.place).name)
-        said.append(f'"{name}" is {size:.3g} long, a {kind} in {" or ".join(units) or "no unit"}')
+        said.append(f'"{name}" is {size:.3g} long, possible for a {kind} in {" or ".join(units) or "no unit"}')
     shared, why = set.intersection(*fitting), "; ".join(said)
     if len(shared) != 1:
         what = "several units suit" if shared else "no unit suits"

@@ -213,7 +213,7 @@ def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:
 
 
 def changes(one: Made, whole: Run, context: MeasurementContext) -> dict[str, float]:
-    """The greatest change over frames from the ``whole`` by ``metric.statistic``; empty for an unfinished run or a NaN."""
+    """The greatest change over frames from the ``whole`` by ``metric.statistic``; empty for an unfinished run or if any is NaN."""
     if one.reached is None:
         return {}
     found = greatest(one.reached, whole, context, {name.split(".")[0] for name in MEASURES})

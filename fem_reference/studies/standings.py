@@ -46,7 +46,7 @@ _METRICS = (*in_tables(), "joint_moment")
 @dataclass(frozen=True)
 class Entrant:
     """A solver in standings: its ``group``; for a program the ``law`` that it states and the effects that it models (``takes``);
-    for submitted frames their only ``case``, empty for all, and the key ``scene`` of its export, empty if unknown.
+    for submitted frames the ``case``, empty for all cases, and the key of the exported ``scene``, empty if unknown.
     """
 
     candidate: Candidate
@@ -59,7 +59,7 @@ class Entrant:
 
 
 def program(folder: Path) -> Entrant:
-    """The program in a ``folder`` of that name, ``NAME/NAME.py``, with the settings of its ``candidate.toml`` as options."""
+    """The program ``NAME/NAME.py`` in a ``folder`` of that name, with the settings of its ``candidate.toml`` as options."""
     file = folder / recorded.ABOUT
     said = parse(command.Description, texts.toml(file), str(file))
     if said.law is not None:
@@ -189,7 +189,7 @@ class _Measured:
         return made(one.candidate.name, one.candidate, one.candidate.name)
 
     def row(self, one: Entrant, run: Run, key: str) -> Standing:
-        """The row of a run of this ``key``; late if it took more than the time limit, even if stored under another limit."""
+        """The row of a run of this ``key``; timed out if it took more than the time limit, even if stored under another limit."""
         own = run is self.reference
         submitted = one.candidate.solver == "recorded"  # then its time was measured on another machine
         limit = None if own or submitted else self.bench.time_limit

@@ -1,4 +1,4 @@
-"""Bands of results that uncertain parameters of a case allow, from runs of its reference on a Latin hypercube."""
+"""Bands of results due to uncertain parameters of a case, from runs of its reference on a Latin hypercube."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -28,7 +28,7 @@ FORCE = "force on "
 
 
 def study(case: MuscleCase, store: Path, workers: Workers, runs: int, seed: int = 1) -> Uncertainty:
-    """Bands of a case from ``runs`` of its reference, none if it has no solution; InputError if no parameter has a range."""
+    """Bands of a case from ``runs`` of its reference, none if the case has no solution; InputError if no parameter has a range."""
     varied = unknowns(case)
     case, parameters = varied.case.model_copy(update={"expect": ()}), varied.parameters()  # as nothing is to be judged
     points = sampled(len(parameters), runs, seed)
@@ -107,7 +107,7 @@ def _rows(found: Sequence[Floats], like: Floats) -> Floats:
 
 
 def _surface(comparison: Comparison, context: MeasurementContext, design: Design, runs: Sequence[Run]) -> Band:
-    """The band of the distance of the surface from the case's own, root mean square over its area."""
+    """The band of the distance of the surface from that of the case, root mean square over the area."""
     reference, bars = comparison.reference, comparison.error_bars
     title, frames = "Distance of the surface from that of the case, rms", len(reference.numbers)
     empty = _empty(comparison, ".".join(SURFACE), title, described()[SURFACE].unit, np.zeros(frames))
@@ -121,7 +121,7 @@ def _surface(comparison: Comparison, context: MeasurementContext, design: Design
 
 
 def _empty(comparison: Comparison, quantity: str, title: str, unit: str, nominal: Floats) -> Band:
-    """A band without values yet, around the answer of the case."""
+    """A band without values yet, around the result of the case."""
     unknown = np.full(len(nominal), np.nan)
     return Band(quantity, title, unit, comparison.reference.numbers, nominal, unknown, unknown, unknown)
 

@@ -25,7 +25,7 @@ class Unknowns:
         return self.at({})
 
     def at(self, values: dict[str, float]) -> MuscleCase:
-        """The case with other ``values`` by key, in internal units; InputError if a file could not state them."""
+        """The case with other ``values`` by key, in internal units; InputError if they are not valid in a file."""
         changed = casefile.with_numbers(self.whole, values)
         acting = tuple(changed.effect[i] for i in self.kept)
         return changed.model_copy(update={"effect": acting, "choice": "listed", "decisions": (), "uncertain": ()})

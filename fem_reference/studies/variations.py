@@ -38,7 +38,7 @@ type Vary[C] = Callable[[C], C]
 
 
 def on_tetrahedra[C: DrivenCase](case: C, **changes: float) -> C:
-    """The case with other keys of its muscle, or of each of several: ``tet_size`` [mm], ``refinements``."""
+    """The case with other values of keys of its muscle, or of each of several: ``tet_size`` [mm], ``refinements``."""
     return with_muscles(case, lambda _: changes)
 
 
@@ -59,7 +59,7 @@ def by_springs(case: MuscleCase) -> bool:
 
 
 def with_distances[C: DrivenCase](case: C, factor: float, *keys: str) -> C:
-    """The case with ``keys`` of the distances to the surfaces of bones times ``factor``; closed forms are exact."""
+    """The case with ``keys`` that control distances to surfaces of bones multiplied by ``factor``; closed forms are exact."""
     bones = (
         bone.model_copy(update={key: factor * getattr(bone, key) for key in keys}) if bone.surface else bone
         for bone in case.bone
@@ -195,7 +195,7 @@ def _on(whole: Trial, size: float, refinements: int) -> Trial:
 
 
 def _settings(base: Trial) -> Iterator[Trial]:
-    """A trial for each listed value of each setting, except its own value and values that its other settings exclude."""
+    """A trial for each listed value of each setting, except its present value and values that other settings exclude."""
     own = solvers.settings(base.choice, base.name)
     for key, values in solvers.trades(type(own)).items():
         for value in values:

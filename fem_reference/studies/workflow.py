@@ -48,9 +48,9 @@ def solve(
     ``solver``: its name, such as ``"pbd"``, or your function ``solver(scene, out, **settings)``, which reads a folder that
     :func:`export_case` writes and writes frames into another; without it the reference, with the settings of the case. ``settings``
     are those of the ``solver``, as scene files write them; by default those of the case for it, else those of Table 5.1.
-    ``muscle``: the name of the one of several that the ``solver`` solves by itself; the reference solves all together. The
-    run has ``positions`` (f, n, 3) [mm] of the surface's vertices by frame number, ``outcome`` (status, message, cost) and
-    ``folder``. If the solution fails, the status states it, and the frames reached before are kept.
+    ``muscle``: in a case of several muscles, the one that the ``solver`` solves by itself; the reference solves all together. The
+    run has ``positions`` (f, n, 3) [mm] of the surface's vertices in each frame, ``outcome`` (status, message, cost) and
+    ``folder``. If the solution fails, the status states this, and the frames reached before are kept.
     """
     arguments.check_case(case)
     arguments.check_solver(solver, settings, muscle)
@@ -62,7 +62,7 @@ def solve(
 
 
 def _bench(case: Case, muscle: str, folder: Path) -> Bench[Any]:
-    """The bench of a case, or of the ``muscle`` with this name if it is not empty; InputError where the case has none of it."""
+    """The bench of a case, or of the ``muscle`` with this name if it is not empty; InputError if the case has no such muscle."""
     if not muscle:
         return Bench(case, folder)
     arguments.check_muscle(muscle, case)
@@ -115,7 +115,7 @@ def error_bars(
     """Estimate the error of each statistic of a reference, from runs on larger tetrahedra and with finer contact; or that of a
     body, from a solution on smaller cells or with more unknowns in each cell.
 
-    ``reference``: the result of :func:`solve` without a ``solver``, with whose run bars are stored, or of :func:`solve_body`.
+    ``reference``: the result of :func:`solve` without a ``solver``, next to which bars are stored, or of :func:`solve_body`.
     ``muscle``: the name of the muscle whose bars are wanted, in a case of several; the runs solve all muscles.
     Each statistic has a bar for each frame, in its unit; a body has bars of points, forces, moments and energy. None if the
     reference did not converge.
@@ -142,8 +142,8 @@ def compare(
 
     A frame that a run did not reach is NaN, and never a pass. With ``error_bars`` of the reference, from :func:`error_bars`, a
     verdict that they leave in doubt is inconclusive. ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: ``values``
-    (f,), ``unit``, ``worst`` frame. ``muscle``: the name of the one of several that is compared; ``reference`` is that of all,
-    ``candidates`` are of this muscle.
+    (f,), ``unit``, ``worst`` frame. ``muscle``: in a case of several muscles, the one that is compared; ``reference`` is the run
+    of all muscles, ``candidates`` are runs of this muscle.
     """
     arguments.check_case(case)
     arguments.check_run(reference, case, "reference")
@@ -188,7 +188,7 @@ def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any)
 
     ``settings`` are as under ``[reference]`` in a scene file: ``element``, ``first_step``, ``residual``, ... The run has
     ``states``, each with ``points`` (n, 3) [mm] of the nodes and ``forces`` (3,) [N] by name of the prescribed displacement, and
-    the ``outcome``. :func:`error_bars` estimates the error of cells of this size.
+    the ``outcome``. :func:`error_bars` estimates the error due to the size of the cells.
     """
     with reported(progress):
         chosen = parse(fenicsx.BodySettings, settings, "settings")

@@ -1,11 +1,11 @@
-"""A box to squeeze between plates, straight fibres in it, and where to attach it loosely.
+"""A box to squeeze between plates, straight fibres in it, and the vertices at which it is attached loosely.
 
     python meshes/box/build.py
 
 writes box.ply, fibres.vtk, sides.csv and card.toml beside this file. Lengths in mm; y is the direction in which plates squeeze it.
 
-The faces of the box are cut into squares of 5 mm, and each of those into two triangles along the diagonal from its lowest to its
-highest corner: as grids of boxes of 5, 10 or 20 mm are that are cut into Kuhn's tetrahedra, so that those nest in it.
+The faces of the box are cut into squares of 5 mm, and each of these into two triangles along the diagonal from its lowest to its
+highest corner. So grids of boxes of 5, 10 or 20 mm, each cut into Kuhn's tetrahedra, have matching faces.
 """
 
 import hashlib
@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 FOLDER = Path(__file__).resolve().parent
 LOW, HIGH, SQUARE = np.array([-50, 10, -50]), np.array([50, 90, 50]), 5
-STEP = 10  # between the points of a fibre
-# Where the fibres along y are, (x, z), and those along x, (y, z).
+STEP = 10  # distance between the points of a fibre
+# Positions of the fibres along y, (x, z), and of those along x, (y, z).
 ALONG_Y = [(x, z) for x in (-35, 0, 35) for z in (-30, 30)]
 ALONG_X = [(y, z) for y in (20, 50, 80) for z in (-10, 10)]
 
-# Half the extent in y and z, about the middle, of what is attached of the faces across x.
+# Half the extent in y and z of the attached areas in the middle of the faces across x.
 HALF = np.array([20, 30])
 
 Floats = NDArray[np.float64]
@@ -109,7 +109,7 @@ def main() -> None:
     surface, threads = ply(points, triangles), vtk(lines)
     listed = "\n".join(["vertex", *map(str, attached), ""]).encode()
     size = f"triangles = {len(triangles)}\nvolume_mm3 = {volume:.3f}"
-    text = "# A box to squeeze. Written by build.py: change that, not this.\n"
+    text = "# A box to squeeze. Written by build.py; do not edit.\n"
     text += entry("box.ply", "box of 100 x 80 x 100, y from 10 to 90, in squares of 5", size, surface)
     text += entry(
         "fibres.vtk", "straight lines in the box, six along y and six along x", f"lines = {len(lines)}", threads

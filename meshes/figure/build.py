@@ -1,12 +1,12 @@
-"""A standing person of our own, 1.75 m tall, as one closed triangle surface.
+"""A standing person, made for this project, 1.75 m tall, as one closed triangle surface.
 
     python meshes/figure/build.py
 
 writes figure.ply and card.toml beside this file. Lengths in mm; the figure stands on the plane y = 0 and faces +z, +x
-is its left. Vertex 0 is the tip of the nose and vertex 1 the next one to it.
+is its left. Vertex 0 is the tip of the nose and vertex 1 the vertex nearest to it.
 
-The body is where a function is negative: a smooth union of rods. Vertices are spread over its zero level, closer where
-the parts are small; the triangles are those of their Delaunay tetrahedra between one centred inside and one centred outside.
+The body is the region in which a function, a smooth union of rods, is negative. Vertices are spread over its zero level, more
+densely on small parts. A triangle lies between two of their Delaunay tetrahedra, one centred inside and one outside the body.
 """
 
 import hashlib
@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, KDTree
 
 FOLDER = Path(__file__).resolve().parent
-NOSE = np.array([[0.0, 1607.0, 121.0]])  # about its tip
-FLOOR, SOLE = -15.5, 60.0  # height [mm] of a plane that cuts the feet, and how much it rounds them
-STEP = 0.01  # of the difference quotients of the gradient [mm]
-SPREAD = 0.35  # how fast edges may grow with the distance from a part of smaller edges
-PACKING = 0.91  # least distance of two first vertices, as a part of the edge length wanted there
-ROUNDS = 20  # of evening out the vertices
+NOSE = np.array([[0.0, 1607.0, 121.0]])  # approximate position of its tip
+FLOOR, SOLE = -15.5, 60.0  # height of a plane that cuts the feet, and width of the rounding there [mm]
+STEP = 0.01  # step of the difference quotients of the gradient [mm]
+SPREAD = 0.35  # growth of edge lengths with the distance from a part with shorter edges
+PACKING = 0.91  # least distance of two initial vertices, as a fraction of the desired edge length
+ROUNDS = 20  # number of rounds that even out the vertices
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -32,7 +32,7 @@ Triple = tuple[float, float, float]
 
 
 class Part(NamedTuple):
-    """A rod between two points, with a radius at each, its section stretched along x, y, z; it comes with its mirror."""
+    """A rod between two points, with a radius at each and a section stretched along x, y, z; its mirror image is added."""
 
     name: str
     start: Triple
@@ -40,7 +40,7 @@ class Part(NamedTuple):
     radii: tuple[float, float]
     stretch: Triple
     blend: float  # width of the fillet towards the parts before it
-    edge: float  # length wanted of the triangles' edges
+    edge: float  # desired edge length of the triangles
 
 
 ROUND = (1.0, 1.0, 1.0)
@@ -80,7 +80,7 @@ def smooth_minimum(one: Floats, other: Floats, width: float) -> Floats:
 
 
 def rod_distance(points: Floats, part: Part) -> Floats:
-    """Distance (n,) [mm], about, of ``points`` (n, 3) from a part on its own side, negative inside."""
+    """Approximate distance (n,) [mm] of ``points`` (n, 3) from a part without its mirror image, negative inside."""
     axis: Floats = np.subtract(part.end, part.start)
     along = np.clip((points - part.start) @ axis / (axis @ axis), 0, 1)
     offset = (points - part.start - along[:, None] * axis) / part.stretch
@@ -89,12 +89,12 @@ def rod_distance(points: Floats, part: Part) -> Floats:
 
 
 def part_distance(points: Floats, part: Part) -> Floats:
-    """As ``rod_distance``, of a part and its mirror image."""
+    """Distance as ``rod_distance``, from a part and its mirror image."""
     return smooth_minimum(rod_distance(points, part), rod_distance(points * [-1, 1, 1], part), part.blend)
 
 
 def body_distance(points: Floats) -> Floats:
-    """Distance (n,) [mm], about, of ``points`` (n, 3) from the skin, negative inside the body."""
+    """Approximate distance (n,) [mm] of ``points`` (n, 3) from the skin, negative inside the body."""
     body = part_distance(points, PARTS[0])
     for part in PARTS[1:]:
         body = smooth_minimum(body, part_distance(points, part), part.blend)
@@ -102,7 +102,7 @@ def body_distance(points: Floats) -> Floats:
 
 
 def edge_length(points: Floats) -> Floats:
-    """Length (n,) [mm] wanted of the edges at ``points`` (n, 3)."""
+    """Desired length (n,) [mm] of the edges at ``points`` (n, 3)."""
     wanted = [part.edge + SPREAD * np.maximum(part_distance(points, part), 0) for part in PARTS]
     return np.min(wanted, axis=0)
 
@@ -133,7 +133,7 @@ def dense_points() -> Floats:
 
 
 def scattered(points: Floats) -> Floats:
-    """The tip of the nose and, ever farther from it, all ``points`` that keep their distance from those before."""
+    """The tip of the nose and, in order of the distance from it, all ``points`` far enough from those chosen before."""
     tip = on_skin(NOSE, 4)
     points = np.concatenate([tip, points[np.argsort(np.linalg.norm(points - tip, axis=1))]])
     tree, free, chosen = KDTree(points), np.ones(len(points), bool), []
@@ -151,7 +151,7 @@ def skin_triangles(points: Floats) -> Ints:
     corners = points[mesh.simplices]
     sides = corners[:, 1:] - corners[:, :1]
     centres = corners[:, 0] + np.linalg.solve(sides, (sides**2).sum(axis=2, keepdims=True) / 2)[:, :, 0]
-    inside = np.append(body_distance(centres) < 0, False)  # the last for beyond the hull, neighbour -1
+    inside = np.append(body_distance(centres) < 0, False)  # the last entry: beyond the hull, neighbour -1
     tet, opposite = np.nonzero(inside[:-1, None] & ~inside[mesh.neighbors])
     others = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])[opposite]
     triangles = np.take_along_axis(mesh.simplices[tet], others, axis=1).astype(np.int64)
@@ -162,7 +162,7 @@ def skin_triangles(points: Floats) -> Ints:
 
 
 def evened(points: Floats) -> Floats:
-    """``points`` (n, 3), but the first, moved over the skin to the middle of their triangles, each weighed by its size."""
+    """``points`` (n, 3), except the first, moved along the skin to the weighted mean of the centroids of their triangles."""
     triangles = skin_triangles(points)
     a, b, c = (points[triangles[:, corner]] for corner in range(3))
     middle = (a + b + c) / 3
@@ -198,9 +198,9 @@ def ply(points: Floats, triangles: Ints) -> bytes:
 
 
 def card(content: bytes, points: Floats, triangles: Ints) -> str:
-    """card.toml."""
+    """The text of card.toml."""
     a, b, c = (points[triangles[:, corner]] for corner in range(3))
-    return f"""# A standing figure. Written by build.py: change that, not this.
+    return f"""# A standing figure. Written by build.py; do not edit.
 
 [[file]]
 name = "figure.ply"

@@ -1,13 +1,13 @@
-"""An idealised right hip of our own: pelvis, femur and a gluteus-like muscle between them, as closed triangle surfaces.
+"""An idealised right hip, made for this project: pelvis, femur and a gluteus-like muscle, as closed triangle surfaces.
 
     python meshes/hip/build.py
 
 writes muscle.ply, pelvis.ply, femur.ply and card.toml beside this file. Lengths in mm; the hip joint centre is the
 origin, +x the subject's left, +y posterior, +z superior. Flexion turns the femur by a negative angle about +x.
 
-The muscle is a loft of ellipses along a Bezier curve. Its two ends are flat and lie ``GAP`` before flat faces of the
-bones, so that the vertices within 1.5 mm of a bone are those of the end and no others. Its triangles are finer towards
-the ends: what is attached then stops at their rims.
+The muscle is a loft of ellipses along a Bezier curve. Its two ends are flat and lie at a distance of ``GAP`` from
+flat faces of the bones, so that exactly the vertices of an end are within 1.5 mm of a bone. Its triangles are finer
+towards the ends, so that attached areas stop at the rims of the ends.
 """
 
 import hashlib
@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 FOLDER = Path(__file__).resolve().parent
-GAP = 0.5  # between an end of the muscle and its bone
+GAP = 0.5  # distance between an end of the muscle and its bone
 ORIGIN, ORIGIN_NORMAL = np.array([12.0, 82.0, 68.0]), np.array([-0.25, 0.36, -0.90])
 INSERTION, INSERTION_NORMAL = np.array([-46.0, 30.0, -96.0]), np.array([0.05, 0.50, 0.87])
-BOW = 58.0  # length of the Bezier handles: how far the muscle bulges backwards
-END_SIZE = 2.4  # edges of the muscle's triangles at its ends
+BOW = 58.0  # length of the Bezier handles, which determines how far the muscle bulges backwards
+END_SIZE = 2.4  # edge length of the muscle's triangles at its ends
 END_RADIUS, BELLY_RADIUS, FLATNESS = 9.6, 21.0, 1.12
 SECTIONS = 15
 
@@ -40,7 +40,7 @@ def unit(vector: Floats) -> Floats:
 
 
 def axis_point(s: float) -> Floats:
-    """The axis of the muscle (3,) [mm] at ``s`` in 0..1: a cubic Bezier curve along the normals of both faces."""
+    """The point (3,) [mm] of the muscle's axis at ``s`` in 0..1: a cubic Bezier curve along the normals of both faces."""
     start, end = ORIGIN + GAP * unit(ORIGIN_NORMAL), INSERTION + GAP * unit(INSERTION_NORMAL)
     handles = start + BOW * unit(ORIGIN_NORMAL), end + BOW * unit(INSERTION_NORMAL)
     weights = (1 - s) ** 3, 3 * s * (1 - s) ** 2, 3 * s**2 * (1 - s), s**3
@@ -81,7 +81,7 @@ def rod(start: list[float], end: list[float], radii: tuple[float, float]) -> lis
 
 
 def cut_flat(body: Tag, face: Floats, normal: Floats) -> Tag:
-    """What is left of ``body`` behind the plane through ``face`` with the outward ``normal``."""
+    """The part of ``body`` behind the plane through ``face`` with the outward ``normal``."""
     occ = gmsh.model.occ
     block = occ.addBox(*(face - [200, 200, 0]), 400, 400, 400)
     turn_axis = np.cross([0, 0, 1], unit(normal))
@@ -106,7 +106,7 @@ def pelvis() -> list[Tag]:
 
 
 def femur() -> list[Tag]:
-    """Head, neck, greater trochanter, shaft, condyles, and the tuberosity whose face the muscle ends on."""
+    """Head, neck, greater trochanter, shaft, condyles, and the tuberosity with the face on which the muscle ends."""
     head = (3, gmsh.model.occ.addSphere(0, 0, 0, 22))
     neck = (3, gmsh.model.occ.addCone(0, 0, 0, -42, 0, -34, 14, 16))
     trochanter = ellipsoid([-46, 2, -22], [16, 19, 26])
@@ -116,7 +116,7 @@ def femur() -> list[Tag]:
 
 
 def finer_towards_the_ends(_dimension: int, _tag: int, x: float, y: float, z: float, size: float) -> float:
-    """The edge length wanted of the muscle at a point: ``END_SIZE`` on its end faces, 0.7 mm more each mm away."""
+    """The desired edge length of the muscle at a point: ``END_SIZE`` on its end faces, and 0.7 mm more per mm of distance."""
     heights = (unit(ORIGIN_NORMAL) @ ([x, y, z] - ORIGIN), unit(INSERTION_NORMAL) @ ([x, y, z] - INSERTION))
     return min(size, END_SIZE + 0.7 * max(0.0, float(min(heights)) - GAP))
 
@@ -202,7 +202,7 @@ sha256 = "{hashlib.sha256(content).hexdigest()}"
 
 def main() -> None:
     """Write the surfaces and their card."""
-    text = "# An idealised hip. Written by build.py: change that, not this.\n"
+    text = "# An idealised hip. Written by build.py; do not edit.\n"
     for name, (points, triangles) in build().items():
         content = ply(points, triangles)
         (FOLDER / f"{name}.ply").write_bytes(content)

@@ -3,11 +3,11 @@
     python meshes/two_muscles/build.py
 
 writes deep.ply, superficial.ply and card.toml beside this file. Lengths in mm; the muscles run along x from 0 to 100, and z points
-from the deep one to the superficial one.
+from the deep muscle to the superficial one.
 
-A cross-section is an ellipse, whose size grows with ``0.4 + 0.6 sin(pi x / 100)`` from the flat ends to the middle: 20 mm wide
-and 8 mm high there of the deep muscle, 16 and 6 of the superficial one (semi-axes). The middle line of the deep muscle is
-straight; that of the superficial one follows it, so that 2 mm are between the two all along their middles.
+A cross-section is an ellipse, whose size grows as ``0.4 + 0.6 sin(pi x / 100)`` from the flat ends to the middle. Its semi-axes in
+the middle are 20 and 8 mm for the deep muscle, 16 and 6 mm for the superficial one. The middle line of the deep muscle is straight;
+that of the superficial muscle is curved, so that a gap of 2 mm remains between the muscles along their middle.
 """
 
 import hashlib
@@ -30,7 +30,7 @@ def growth(x: Floats) -> Floats:
 
 
 def muscle(name: str) -> tuple[Floats, Ints]:
-    """The surface of a muscle: rings around it, and ends of rings around a middle, all outward."""
+    """The surface of a muscle, with outward triangles: rings around it, and ends of rings around a middle point."""
     wide, high = SIZES[name]
     lift = 0.0 if name == "deep" else SIZES["deep"][1] + high
     angles = 2 * np.pi * np.arange(AROUND) / AROUND
@@ -60,7 +60,7 @@ def muscle(name: str) -> tuple[Floats, Ints]:
 
 
 def middle(x: float, lift: float) -> float:
-    """The height of the middle line, ``lift`` in the middle of a muscle over another."""
+    """The height of the middle line at ``x``, which is ``lift`` above the gap in the middle; 0 for the deep muscle."""
     return float(lift * growth(np.array(x)) + GAP) if lift else 0.0
 
 
@@ -88,7 +88,7 @@ def build() -> dict[str, tuple[Floats, Ints]]:
 
 def main() -> None:
     """Write the muscles and their card."""
-    text = "# Two muscles, one over the other. Written by build.py: change that, not this.\n"
+    text = "# Two muscles, one over the other. Written by build.py; do not edit.\n"
     for name, (points, triangles) in build().items():
         content = ply(points, triangles)
         (FOLDER / f"{name}.ply").write_bytes(content)

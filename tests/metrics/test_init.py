@@ -57,7 +57,7 @@ def test_statistics_stand_in_the_order_of_their_positions(where: metrics.Shown) 
 def test_tables_begin_with_the_volume_and_rankings_with_the_surface() -> None:
     assert in_tables() == ("volume", "fibre_length", "moment_arm", "surface_deviation", "penetration")
     assert next(iter(described("rank"))) == ("surface_deviation", "rms")
-    assert described()["surface_deviation", "rms_percent"].full_unit == "% of travel"
+    assert described()["surface_deviation", "rms_percent"].full_unit == "% of maximum displacement"
     assert described()["fibre_length", "max"].label == "Fibre length, worst fibre"
 
 

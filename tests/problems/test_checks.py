@@ -221,8 +221,8 @@ def test_a_path_is_real_and_begins_at_rest(changes, message) -> None:
 
 def test_bones_and_a_start_are_what_they_should_be() -> None:
     refused(replace(BODY, bones=(3,)), r"bones\[0\]: got int 3, want ContactBone records")
-    refused(replace(BODY, start=lambda points: points * NAN), "start: got places .*, not all finite")
-    refused(replace(BODY, start=lambda _: np.zeros(3)), r"start: got places \(3,\)")
+    refused(replace(BODY, start=lambda points: points * NAN), "start: got positions .*, not all finite")
+    refused(replace(BODY, start=lambda _: np.zeros(3)), r"start: got positions \(3,\)")
 
 
 @pytest.mark.skipif(not installed(), reason="FEniCSx is not installed")

@@ -32,7 +32,7 @@ def test_a_scene_keeps_what_it_needs_and_has_the_key_of_that(tmp_path) -> None:
     assert "NeoHooke: kept, as part of the material" in str(kept[0].decisions[0])
     itself = make_effect("touching", stiffness=0.1, smoothing=0.1)
     decided = estimates.Decision(itself, needed=True, indicator=None, bound=0.1, stress_bound=0.1)
-    assert str(decided) == "MuscleContact: kept, as no estimate shows what touches"
+    assert str(decided) == "MuscleContact: kept, as no estimate shows which surfaces touch"
 
 
 @pytest.mark.slow

@@ -80,7 +80,7 @@ def test_the_shipped_plates_are_the_report_s() -> None:
             {"effect": [DIFFUSION, {"name": "source", "strength": 1, "where": "y above average"}]},
             r"where: got .* on an interval",
         ),
-        ({"boundary": []}, r"boundary: got no value anywhere and no reaction"),
+        ({"boundary": []}, r"boundary: got no prescribed value and no reaction"),
         ({"boundary": [{"on": "rim", "value": 0}]}, r'boundary\[0\]\.on: got "rim", which has no facets'),
         (
             {"boundary": [{"on": "left", "value": "1/x"}]},

@@ -153,7 +153,7 @@ def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(compari
     assert "The reference (fenicsx): diverged.</b> no equilibrium near the foot; try smaller steps. 3 of 5 " in text
     top = re.search(r"<tr><th>reference</th>.*?</tr>", text, re.DOTALL)[0]
     assert '<span class="badge fail">fail</span>' in top
-    assert "1 of 1 of its own checks met; diverged" in top
+    assert "1 of 1 expectations met; diverged" in top
     assert "not a number" not in text
     assert "frame 40" not in text.replace("from frame 0", "")
     unmet = replace(one.verdicts[0], word="fail", value=NAN, frame=30)

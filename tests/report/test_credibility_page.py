@@ -64,7 +64,7 @@ def test_each_difference_has_its_direction_and_orders_stand_apart() -> None:
     numbers = [replace(of_result(measured(value)), name=name) for name, value in values.items()]
     order = of_result(measured(0.0, truth=1.0, within=0.5, is_order=True))
     said = credibility_page.differences(graded(*numbers, order), ()).split("; ")
-    assert said[0] == "2 too great, by 5 to 8 uncertainties"
+    assert said[0] == "2 too large, by 5 to 8 uncertainties"
     assert said[1:] == ["1 too small, by 3 uncertainties", "1 without a number", "1 of 1 stiffness rankings wrong"]
     assert credibility_page.differences(graded(numbers[0]), ()) == ""
 

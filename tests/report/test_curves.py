@@ -85,7 +85,7 @@ def test_moment_arms_stand_over_the_angle_of_the_joint_in_degrees(comparison):
     over_frames, over_angle = drawn[arms], drawn[f"{arms}, over the angle"]
     assert len(drawn) == 7
     assert "angle of knee [°]" in over_angle
-    assert "least and greatest fibre" in over_angle
+    assert "minimum and maximum over the fibres" in over_angle
     ticks = [float(text) for text in re.findall(r">([\d.]+)</text>", over_angle)]
     assert {10, 50} <= set(ticks)  # 57.3 degrees at the end
     assert max(ticks) < 60

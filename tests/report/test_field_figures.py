@@ -13,9 +13,9 @@ pytestmark = pytest.mark.slow
 def test_without_an_exact_solution_the_reference_is_the_base(tmp_path):
     made = rod(tmp_path / "rod", lambda base: base + 0.5, exact=None)
     titles = [drawing.title for drawing in field_figures.drawings(made)]
-    assert titles == ["Solution at the nodes", "Distance to the reference at the nodes"]
+    assert titles == ["Solution at the nodes", "Difference from the reference at nodes"]
     same = rod(tmp_path / "same", exact=None)
-    assert field_figures.drawings(same)[1].missing == "it is zero everywhere, or not a number"
+    assert field_figures.drawings(same)[1].missing == "the difference is zero everywhere, or not a number"
 
 
 def test_a_flat_surface_in_space_is_drawn(tmp_path):

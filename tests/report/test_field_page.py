@@ -81,12 +81,12 @@ def test_nothing_but_a_diverged_reference_has_a_page(tmp_path):
 
 def test_the_first_sentence_says_how_far_listing_and_equation_part(tmp_path):
     same, other = rod(tmp_path / "rod"), plate(tmp_path / "plate", lambda base: 3 * base)
-    assert field_page.apart(same) == "the listing and the equation agree; their greatest difference at a vertex is 0."
+    assert field_page.apart(same) == "the listing and the equation agree; their maximum difference at a vertex is 0."
     # The reference falls to -2 and the listing to 3 times that: they differ by 4, twice as far as 2.
     minus = "\N{MINUS SIGN}"
     assert field_page.apart(other) == (
-        f"the listing gives {minus}6 to 0, the equation {minus}2 to 0; their greatest difference at a vertex is 4, "
-        "2 times the greatest value of the equation's solution."
+        f"the listing gives {minus}6 to 0, the equation {minus}2 to 0; their maximum difference at a vertex is 4, "
+        "2 times the maximum of the equation's solution."
     )
 
 
@@ -103,8 +103,8 @@ def test_the_worst_example_gives_the_word(tmp_path):
     [
         ("auto", 100.0, "It is above 1, so the form is SUPG"),
         ("auto", 1.0, "It is not above 1, so the form is plain Galerkin"),
-        ("supg", 1.0, "The scene asks for SUPG"),
-        ("galerkin", 100.0, "The scene asks for plain Galerkin"),
+        ("supg", 1.0, "The scene specifies SUPG"),
+        ("galerkin", 100.0, "The scene specifies plain Galerkin"),
     ],
 )
 def test_the_form_is_reported_with_its_reason(tmp_path, form, speed, printed):

@@ -63,9 +63,7 @@ def test_a_candidate_that_nobody_judged_says_so_and_its_numbers(words, tmp_path:
         r"\s*\n\s*", "", mine
     )  # 0.1 mm times frame 20, everywhere
     assert '<span class="badge doubtful">doubtful pass</span>' in reference
-    assert (
-        "1 of 1 of its own checks met; doubtful: unstable equilibrium in 1 of 5 frames; doubtful: det F " in reference
-    )
+    assert "1 of 1 expectations met; doubtful: unstable equilibrium in 1 of 5 frames; doubtful: det F " in reference
     assert "the intended range of a law in 2 of 5 frames, first in frame 15" in reference
     page = (tmp_path / "out" / "bar" / "report.html").read_text()
     below = page[page.index("Deviations at their worst frames") :]

@@ -108,7 +108,7 @@ def test_text_names_failures_and_why_nothing_can_be_said(mixed) -> None:
     assert lines[-1] == "verdict: fail"
     many = replace(mixed, judgements=mixed.judgements[:1] * 20)
     assert regression_texts.text(many).count("fail: ") == regression_texts.MOST_ROWS
-    assert "and 5 more like the last, listed by --json and --junit" in regression_texts.text(many)
+    assert "and 5 more, listed by --json and --junit" in regression_texts.text(many)
 
 
 def test_facts_are_json(mixed) -> None:

@@ -60,9 +60,7 @@ def test_the_unit_is_guessed_where_only_one_makes_a_muscle_and_bones(scale: floa
 
 def test_where_several_units_make_one_it_is_asked_for() -> None:
     muscle, *bones = (files.read_surface(HIP / f"{name}.ply", 0.2) for name in ("muscle", "pelvis", "femur"))
-    want = (
-        r'--unit: got no unit, but "muscle.ply" is 41.*, a muscle in mm or cm; "pelvis.ply" is .*: several units suit'
-    )
+    want = r'--unit: got no unit, but "muscle.ply" is 41.*, possible for a muscle in mm or cm; "pelvis.ply" is .*: several units'
     with pytest.raises(InputError, match=want):
         new_scene.guessed_unit(muscle, bones)
 
@@ -94,7 +92,7 @@ def test_validate_says_what_a_scene_is_and_costs(stl: Path, capsys) -> None:
     printed = capsys.readouterr().out
     assert "mine can be solved" in printed
     assert re.search(
-        r"motion: from \w+ to \w+ it is \d+(\.\d+)? mm at rest, and at most \d+ % (longer|shorter), in frame 20",
+        r"motion: the distance from \w+ to \w+ is \d+(\.\d+)? mm at rest, and at most \d+ % (longer|shorter), in frame 20",
         printed,
     )
     assert "of processor time, within a factor of three, for 11 frames" in printed

@@ -93,7 +93,10 @@ def test_a_guess_is_printed_with_what_it_follows_from(tmp_path: Path, capsys) ->
     assert made(tmp_path, bodies(tmp_path, dict.fromkeys(SIZES, 1000.0)), *options) == cli.DONE
     said = capsys.readouterr().out
     # sqrt(207^2 + 2 * 30^2) and sqrt(300^2 + 2 * 30^2) mm, in m
-    assert 'lengths are in m (guessed: "muscle.stl" is 0.211 long, a muscle in m; "low.stl" is 0.303 long' in said
+    assert (
+        'lengths are in m (guessed: "muscle.stl" is 0.211 long, possible for a muscle in m; "low.stl" is 0.303 long'
+        in said
+    )
     assert json.loads((tmp_path / "new.json").read_text())["unit"] == "m"
     assert length(tmp_path) == pytest.approx(207, rel=1e-5)
 
@@ -102,12 +105,13 @@ def test_a_muscle_in_inches_is_not_taken_for_one_in_centimetres(tmp_path: Path, 
     # A muscle of 211.3 mm is 8.32 inches long, which is one in cm too; its bones in inches do not decide it.
     assert made(tmp_path, bodies(tmp_path, dict.fromkeys(SIZES, 25.4))) == cli.BAD_INPUT
     assert re.search(
-        r'--unit: got no unit, but "muscle.stl" is 8.32 long, a muscle in cm or in; ', capsys.readouterr().err
+        r'--unit: got no unit, but "muscle.stl" is 8.32 long, possible for a muscle in cm or in; ',
+        capsys.readouterr().err,
     )
     # Bones in mm beside it contradict both.
     assert made(tmp_path, bodies(tmp_path, {"muscle": 25.4})) == cli.BAD_INPUT
     said = capsys.readouterr().err
-    assert 'a muscle in cm or in; "low.stl" is 303 long, a bone in mm' in said
+    assert 'a muscle in cm or in; "low.stl" is 303 long, possible for a bone in mm' in said
     assert "no unit suits all of them" in said
     assert not (tmp_path / "mine").exists()
 

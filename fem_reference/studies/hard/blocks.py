@@ -27,7 +27,7 @@ from fem_reference.studies.hard.records import FACES, FIRST, Face, Hard, Hold, L
 # The default material of blocks: the usual matrix of muscle.
 MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible", bulk="10 MPa"))
 _LINES, _POINTS = 4, 9  # the number of measured lines of each block, and of points of each line
-# The bones of held faces are spheres far from the block; their radius and distance are in sizes of the block.
+# The bones of held faces are spheres far from the block; their radius and distance are relative to the size of the block.
 _BALL, _AWAY = 0.01, 50.0
 _SAME = 1e-9  # the greatest rounding difference between equal motions of two holds, relative to the block's size
 
@@ -78,7 +78,7 @@ def several(hard: Hard) -> MusclesProblem:
 
 
 def _named(name: str, one: MuscleProblem) -> MuscleProblem:
-    """A block whose holds have bones with its ``name``."""
+    """The block ``one``, with its ``name`` before the names of the bones of its holds."""
     held = (replace(entry, bone=replace(entry.bone, name=f"{name}: {entry.bone.name}")) for entry in one.attached)
     return replace(one, attached=tuple(held))
 
@@ -158,8 +158,8 @@ def _held(block: Lattice, hold: Hold, nodes: Ints, surface: Surface) -> Attached
 
 
 def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> None:
-    """Raise InputError if two holds move their shared vertices to different places: most solvers would obey only one of them."""
-    assert hard.frames is not None  # beside a block
+    """Raise InputError if two holds move shared vertices to different positions: most solvers would obey only one of the holds."""
+    assert hard.frames is not None  # a block has frames
     keyframes = (key.frame for hold in hard.hold if hold.motion for key in hold.motion.keyframes)
     frames = sorted({*hard.frames.numbers, *keyframes})
     for (_, one), (j, other) in combinations(enumerate(ends), 2):

@@ -27,7 +27,7 @@ _MOST_FOR_SECOND = 200  # tetrahedra that the second solver solves in seconds
 SAME = 0.01  # [%] of the body's size: states that differ by more are different
 _CUTS = 64  # the greatest factor by which a load step is cut before the run gives up
 MOVED = 0.1  # greatest random displacement of points of a block, in cells
-SIZES = 0.03  # greatest relative change of the size of tetrahedra of a shipped case
+SIZES = 0.03  # greatest relative change of the tetrahedron size of a shipped case
 LONGEST = 60.0  # greatest processor time [s] of a run that is repeated
 
 Solve = Callable[[Hard], tuple[Outcome, Followed]]
@@ -121,7 +121,7 @@ def farthest(followed: Followed) -> StepCounts | None:
 
 
 def in_steps(built: MechanicalProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
-    """Compare runs of the reference to a frame, in several numbers of equal load steps, with the finest run that reached it."""
+    """Compare runs of the reference up to a frame, each in another number of equal load steps, with the finest that reached it."""
     ends, words, span = dict[int, Floats](), list[str](), steps.until - built.frames[0]
     for count in steps.counts:
         step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}

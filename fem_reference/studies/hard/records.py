@@ -24,7 +24,7 @@ from fem_reference.scenes.muscle import CaseBone, Frames, Motion
 FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
 FACES: tuple[Face, ...] = get_args(Face)
-_MOST_CELLS = 50_000  # the greatest number of cells of a block, more than any solver solves within its time limit
+_MOST_CELLS = 50_000  # the maximum number of cells of a block, more than any solver solves within its time limit
 FIRST = "block"  # the name of the first of several bodies
 REFERENCE, SECOND = "fenicsx", "scikit_fem"
 LIMIT = 120.0  # the limit of processor time of a run [s]
@@ -39,8 +39,8 @@ class Lattice(Record):
     """A block of ``size`` from its ``corner``, with a number of ``cells`` along each axis, each cut into six tetrahedra.
 
     ``grading``: along each axis, ratio of last to first cell. ``jitter``: the greatest random displacement, in cell sizes, of nodes
-    inside the block and inside its faces; ``seed``: the seed of the random numbers. ``rounding``: how far the block is morphed into
-    an ellipsoid, from 0 (a block) to almost 1 (an ellipsoid). ``fibre``: the direction of fibres and of the measured
+    inside the block and inside its faces; ``seed``: the seed of the random numbers. ``rounding``: the degree to which the block is
+    morphed into an ellipsoid, from 0 (a block) to almost 1 (an ellipsoid). ``fibre``: the direction of fibres and of the measured
     lines. ``points_apart`` [mm]: the spacing of points of contact and springs, by default as on muscles.
     """
 
@@ -60,7 +60,7 @@ class Lattice(Record):
 
 
 class Hold(Record):
-    """A ``face`` of a block, or the face's ``middle`` vertex, attached by springs or exactly to a bone at rest or in ``motion``."""
+    """A ``face`` of a block, or its ``middle`` vertex, attached to a bone at rest or in ``motion``, by springs or exactly."""
 
     face: Face
     middle: bool = False
@@ -100,7 +100,7 @@ class Shipped(Record):
 
 
 class StepCounts(Record):
-    """Numbers of equal load steps (``counts``) in which the reference goes to frame ``until``; all should reach the same state."""
+    """Numbers of equal load steps (``counts``) in which the reference solves up to frame ``until``; all should end in one state."""
 
     until: int
     counts: tuple[Annotated[int, Field(gt=0)], ...] = Field(default=(1, 10, 40), min_length=1)
@@ -181,7 +181,7 @@ class Hard(Record):
 
 
 def choices() -> dict[str, SolverChoice]:
-    """Settings for hard cases by solver: its special ones, else those of the first candidate of Table 5.1 with that solver."""
+    """Settings of each solver for hard cases: special ones, else those of the first candidate of Table 5.1 with this solver."""
     found = {name: SolverChoice(solver=name, **settings) for name, settings in _OWN.items()}
     for candidate in solvers.in_table():
         found.setdefault(candidate.solver, SolverChoice(solver=candidate.solver, **candidate.settings))

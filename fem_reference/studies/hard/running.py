@@ -34,10 +34,10 @@ from fem_reference.studies.law_split import LAW
 
 log = logging.getLogger(__name__)
 
-# The least time [s] after which a limit fires again: not while the first exception ends the work.
+# The least time [s] after which a limit raises again, long enough for the first exception to end the work.
 _AGAIN = 1.0
 LONGER = 600.0  # the limit of processor time [s] of a case's runs in several numbers of load steps or on several meshes
-# The pattern by which messages state a place at rest [mm].
+# The pattern of a rest position [mm] in messages.
 _PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
 
 
@@ -49,8 +49,8 @@ class _Late(Exception):  # noqa: N818 - it is an event in a run, not an error, a
 class Posed:
     """A hard case with its problem, made once, and the reference's run of it (``truth``: positions and frames).
 
-    ``in_steps``: the reference goes to its farthest frame in several numbers of load steps, even if the case does not ask for it;
-    ``jitters``: the number of other meshes on which it runs.
+    ``in_steps``: the reference also solves up to its farthest frame in several numbers of load steps, even if the case does not
+    request this; ``jitters``: the number of other meshes on which the reference also runs.
     """
 
     hard: Hard
@@ -77,9 +77,9 @@ def run(
     in_steps: bool = False,
     jitters: int = 0,
 ) -> Stress:
-    """Run every solver, or ``only`` the named ones, and the user's ``own`` on each case, the reference first. It also runs
-    ``in_steps`` and on ``jitters`` other meshes. ``own`` has, for each solver, the effects that it models besides a law of the
-    whole muscle, None if unknown.
+    """Run every solver, or ``only`` the named ones, and the user's ``own`` on each case, the reference first. ``in_steps`` and
+    ``jitters``: see ``Posed``. ``own`` has, for each solver, the effects that it models besides a law of the whole muscle, None
+    if these are unknown.
     """
     begin, clock, cells = time.perf_counter(), MachineTime.now(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
@@ -99,7 +99,7 @@ def run(
 
 
 def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = None) -> Cell:
-    """The cell of a case by a solver; a failure is a verdict, never an exception. Not applicable if the solver leaves out an
+    """The cell of a solver on a case; a failure is a verdict, never an exception. Not applicable if the solver leaves out an
     effect: ``takes`` lists the effects that it models besides a law, None if unknown.
     """
     begin = time.perf_counter()
@@ -209,7 +209,7 @@ def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Fo
 
 
 def _scene(found: Cell, followed: Followed) -> Scene | None:
-    """The decisive frame (the last one of an unfinished run) with the place named in its message; None without a finite surface."""
+    """The decisive frame (the last one of an unfinished run), with the position in its message; None without a finite surface."""
     ended = found.status != "converged"
     i = len(followed.positions) - 1 if ended else found.at
     points, history = followed.positions[i], found.history
