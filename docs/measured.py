@@ -86,7 +86,7 @@ def main() -> int:
     """Repeat the named measurements and update the tables; the exit status."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", choices=[[], *MEASUREMENTS], metavar="NAME", help=", ".join(MEASUREMENTS))
-    parser.add_argument("--from", dest="folder", type=Path, help="folder with NAME.json, as written by the verb's --json")
+    parser.add_argument("--from", dest="folder", type=Path, help="folder with NAME.json, written by a verb's --json")
     parser.add_argument("--commit", default="HEAD", help="commit at which NAME.json was measured")
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a page is stale")
     given = parser.parse_args()
