@@ -1,6 +1,6 @@
-"""Pictures of the pages, drawn while they are built from the measurements that ``docs/measured`` keeps.
+"""Pictures of the pages, drawn from the measurements in ``docs/measured`` when the pages are built.
 
-``fill`` puts one in place of each ``<!-- drawn: NAME -->``. Colours are those of all pages: a solver has the same one everywhere.
+``fill`` replaces each ``<!-- drawn: NAME -->`` by a picture. A solver has the same colour on all pages.
 """
 
 import re
@@ -31,7 +31,7 @@ def fill(text: str) -> str:
 
 
 def dark_colours() -> dict[str, str]:
-    """The colours of drawings on dark paper, by their names."""
+    """The colours of drawings in the dark style, by name."""
     style = (Path(report.__file__).parent / "style.css").read_text(encoding="utf-8")
     return dict(re.findall(r"--([\w-]+): (#\w+)", re.findall(r":root \{(.*?)\}", style, re.DOTALL)[1]))
 
@@ -44,11 +44,11 @@ def _placed(name: str) -> str:
 
 
 def cost_front(measured: dict[str, Any]) -> Drawing:
-    """Error against time of every setting of every solver, and the fronts, with what the verb recommend says."""
+    """Error against time of every setting of every solver, and the fronts, with the answers of the verb recommend."""
     case = parse(CaseStudy, measured, "fronts")
     said = answer_texts(study_page.answered(case), case.units[_SURFACE])
     answers = (f"{i}: {text[0].lower()}{text[1:]}" for i, text in enumerate(said, 1))
-    title = ". ".join(("Fronts; what to take", *answers, study_page.load_of(case.points).capitalize()))
+    title = ". ".join(("Fronts and recommended settings", *answers, study_page.load_of(case.points).capitalize()))
     return replace(study_page.front(case, _SURFACE), title=title)
 
 
@@ -83,7 +83,7 @@ def solvers_on_muscles(measured: list[dict[str, Any]]) -> Drawing:
 
 
 def omissions(measured: list[dict[str, Any]]) -> Drawing:
-    """The change of the surface when an effect or a feature is left out."""
+    """The change of the surface if an effect or a feature is omitted."""
     rows = [one for one in measured if one["changes"][0] is not None][::-1]
 
     def draw(_: Figure, axes: Axes) -> None:
@@ -92,11 +92,11 @@ def omissions(measured: list[dict[str, Any]]) -> Drawing:
             axes.barh(*zip(*own, strict=True), color=look["color"], height=0.6, label=name)
         names = [", ".join(one["left_out"]).replace("_", " ") for one in rows]
         axes.set_yticks(range(len(rows)), names)
-        axes.set_xlabel("change of the surface without it, rms, mm")
+        axes.set_xlabel("change of the surface, rms, mm")
         _only_along(axes)
         axes.legend(loc="lower right", fontsize="small")
 
-    return drawn("omissions", "Effects of the reference and features of solvers, left out", (7.2, 3.2), draw)
+    return drawn("omissions", "Change if an effect or a feature is omitted", (7.2, 3.2), draw)
 
 
 def matrix(measured: dict[str, Any]) -> Drawing:
@@ -122,7 +122,7 @@ def matrix(measured: dict[str, Any]) -> Drawing:
 
 
 def hard_cases(measured: dict[str, Any]) -> Drawing:
-    """The number of hard cases with each verdict, by solver; the matrix where verdicts of each case are kept."""
+    """The number of hard cases with each verdict for each solver; the matrix, if the verdict of each case was measured."""
     if "verdicts" in measured:
         return matrix(measured)
     rows = [one for one in measured["counts"] if sum(one.get(key, 0) for key in _VERDICTS if key)][::-1]
@@ -142,13 +142,13 @@ def hard_cases(measured: dict[str, Any]) -> Drawing:
 
 
 def _only_along(axes: Axes) -> None:
-    """Lines of the grid only along the values of horizontal bars, and behind these."""
+    """Show only the grid lines of the value axis, behind the horizontal bars."""
     axes.grid(axis="y", visible=False)
     axes.set_axisbelow(True)
 
 
 def _count(row: dict[str, Any], verdict: str) -> int:
-    """The cases of a solver with a verdict; "" is all others."""
+    """The number of cases of a solver with a verdict; "" counts all other verdicts."""
     if verdict:
         return row.get(verdict, 0)
     return sum(count for key, count in row.items() if key != "solver" and key not in _VERDICTS)

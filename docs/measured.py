@@ -1,8 +1,8 @@
-"""Tables of the pages, made from measurements that are kept in ``docs/measured`` with their commit, date and machine.
+"""Tables of the pages, from measurements that are stored in ``docs/measured`` with their commit, date and machine.
 
-``python docs/measured.py`` writes each table into its place on the pages; ``python docs/measured.py NAME ...`` measures these anew
-before (minutes to an hour each), ``--from FOLDER`` takes what is already measured there. A place is ``<!-- measured: NAME -->``
-up to ``<!-- end -->``; ``<!-- written: NAME -->`` is that of a table made from the records that read files.
+``python docs/measured.py`` updates all tables on the pages. ``python docs/measured.py NAME ...`` first repeats the measurements
+NAME (minutes to an hour each), or with ``--from FOLDER`` reads them from a folder. A table stands between
+``<!-- measured: NAME -->`` and ``<!-- end -->``; after ``<!-- written: NAME -->`` it is made from the records that read files.
 """
 
 import argparse
@@ -32,7 +32,7 @@ _PLACE = re.compile(r"(<!-- (?:measured|written): (\w+) -->\n).*?(<!-- end -->)"
 
 
 def write_pages(*, check: bool = False) -> list[str]:
-    """Write every table into its place; with ``check`` write nothing. The pages that differ."""
+    """Update every table on the pages, or with ``check`` write nothing; the names of the pages that differ."""
     stale = []
     for path in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
         text = path.read_text(encoding="utf-8")
@@ -45,7 +45,7 @@ def write_pages(*, check: bool = False) -> list[str]:
 
 
 def measure(name: str, folder: Path | None, commit: str) -> None:
-    """Keep the measurement ``name``: made now, or taken from the ``folder`` where it was made, at a ``commit``."""
+    """Store the measurement ``name``, made now or read from a ``folder``, with the ``commit`` at which it was made."""
     measurement = MEASUREMENTS[name]
     with tempfile.TemporaryDirectory() as scratch:
         found = (folder or Path(scratch)) / f"{name}.json"
@@ -63,14 +63,14 @@ def measure(name: str, folder: Path | None, commit: str) -> None:
 
 
 def _make(measurement: Measurement, path: Path) -> None:
-    """Measure, and write the JSON of the verb to ``path``; that of several cases by their names, also where one has no solution."""
+    """Measure, and write the JSON of the verb to ``path``; for several cases by name, including cases without a solution."""
     if not measurement.command.startswith("./fem "):
-        sys.exit(f"first {measurement.command}, and then --from its folder")
+        sys.exit(f"run {measurement.command} first, and then give its folder with --from")
     found = {}
     for case in measurement.cases or ("",):
         words = shlex.split(measurement.command.replace("CASE", case))[1:]
         words = [sys.executable, "-m", "fem_reference", *words, "--out", str(path.parent), "--json", str(path)]
-        path.unlink(missing_ok=True)  # that of another case
+        path.unlink(missing_ok=True)  # the JSON of the previous case
         subprocess.run(words, cwd=ROOT, check=not case)
         found[case] = json.loads(path.read_text(encoding="utf-8"))
     if measurement.cases:
@@ -78,17 +78,17 @@ def _make(measurement: Measurement, path: Path) -> None:
 
 
 def _short(text: str) -> str:
-    """JSON with each innermost list or record on a line of its own."""
+    """``text`` in JSON with each innermost list or record on one line."""
     return re.sub(r"([\[{])\n\s+([^\[\]{}]*?)\n\s+([\]}])", lambda m: m[1] + re.sub(r"\n\s+", " ", m[2]) + m[3], text)
 
 
 def main() -> int:
-    """Measure what is named, and write the tables; the exit status."""
+    """Repeat the named measurements and update the tables; the exit status."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", choices=[[], *MEASUREMENTS], metavar="NAME", help=", ".join(MEASUREMENTS))
-    parser.add_argument("--from", dest="folder", type=Path, help="where NAME.json is, as the verb's --json wrote it")
-    parser.add_argument("--commit", default="HEAD", help="at which it was measured there")
-    parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 where a page is stale")
+    parser.add_argument("--from", dest="folder", type=Path, help="folder with NAME.json, written by a verb's --json")
+    parser.add_argument("--commit", default="HEAD", help="commit at which NAME.json was measured")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a page is stale")
     given = parser.parse_args()
     for name in given.names:
         measure(name, given.folder, given.commit)

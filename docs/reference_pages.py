@@ -1,6 +1,6 @@
-"""What the pages of reference say, made from what the code reads: keys of records, verbs, public names, cases.
+"""Generated parts of the reference pages, from the code: keys of records, verbs, public names, cases.
 
-``fill`` puts it in place of each ``<!-- generated: WHAT -->`` of a page.
+``fill`` replaces each ``<!-- generated: NAME -->`` of a page.
 """
 
 import argparse
@@ -41,17 +41,17 @@ _WORDS = {str: "string", float: "number", int: "whole number", bool: "true or fa
 
 
 def fill(text: str) -> str:
-    """``text`` of a page with what is generated in its places."""
+    """``text`` of a page with its generated parts."""
     return re.sub(r"<!-- generated: (\w+) -->\n", lambda found: GENERATED[found[1]](), text)
 
 
 def scene_records() -> list[type[Record]]:
-    """The records of scene files: each case, and all that it is made of, once."""
+    """The records of scene files, each once: the cases and all records inside them."""
     return list(dict.fromkeys(inner for case in (MuscleCase, MusclesCase, ScalarCase) for inner in _and_below(case)))
 
 
 def solver_records() -> dict[str, list[type[Record]]]:
-    """By the name of a solver the records of its settings, for whatever it solves."""
+    """The records of the settings of each solver, by its name, for all tasks that it solves."""
     return {
         name: list(dict.fromkeys(record for offer in solvers.offers(name) for record in _and_below(offer.settings)))
         for name in solvers.names()
@@ -59,12 +59,12 @@ def solver_records() -> dict[str, list[type[Record]]]:
 
 
 def effect_records() -> dict[str, list[type[Record]]]:
-    """By the name of an effect its record and those inside."""
+    """The record of each effect and the records inside it, by the name of the effect."""
     return {name: list(_and_below(effects.find(name))) for name in effects.names(Record)}
 
 
 def file_records() -> dict[str, list[type[Record]]]:
-    """By the name of another file that people write or read its record and those inside, but those of scenes."""
+    """The records of each other file that users write or read, by the name of the file, without the records of scenes."""
     files = {
         "candidate.toml": About,
         "candidate.toml of a program": Description,
@@ -97,7 +97,7 @@ def laws() -> str:
 
 
 def parameters() -> str:
-    """The formula and the parameters of every effect, in one table; the region of an effect is said beside it."""
+    """One table with the formula and the parameters of every effect; the page describes the key ``in``, the region, in its text."""
     rows = [
         f"| `{name}` | {_formula(effects.find(name))} | {'; '.join(map(_parameter, keys.items()))} |\n"
         for name, keys in _parameters().items()
@@ -139,7 +139,7 @@ def gallery() -> str:
 
 
 def examples() -> str:
-    """The scripts, whole."""
+    """The complete scripts."""
     scripts = sorted(EXAMPLES.glob("*.py")) + sorted(EXAMPLES.glob("effects/*.py"))
     return "\n".join(_script(path.relative_to(EXAMPLES).as_posix()) for path in scripts)
 
@@ -150,7 +150,7 @@ def cards() -> str:
 
 
 def notebooks() -> str:
-    """The notebooks, whole: their text and their code."""
+    """The complete notebooks: their text and code."""
     return "\n".join(map(_notebook, sorted(EXAMPLES.glob("*.ipynb"))))
 
 
@@ -185,7 +185,7 @@ _SHORTER = {
 
 
 def _parameter(named: tuple[str, Any]) -> str:
-    """A key with its value, and its unit alone where it is a quantity."""
+    """A key with its allowed values; for a quantity only the unit."""
     key, field = named
     value = _value(field.annotation, field.metadata)
     for long, short in () if _rule(field.annotation, field.metadata) else _SHORTER.items():
@@ -205,7 +205,7 @@ def _card(name: str) -> str:
 
 
 def _notebook(path: Path) -> str:
-    """The cells of a notebook below a heading with its file; its own heading is a line."""
+    """The cells of a notebook below a heading with its file name; the notebook's own heading becomes a bold line."""
     cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
     texts = [(cell["cell_type"], "".join(cell["source"])) for cell in cells]
     shown = [f"```python\n{text}\n```" if kind == "code" else text for kind, text in texts]
@@ -231,7 +231,7 @@ def _shown(case: Any) -> str:
 
 
 def _pictures(case: Any) -> str:
-    """Two views of a muscle and its bones at rest; none of what needs data that is licensed apart, or where nothing can draw."""
+    """Two views of a muscle and its bones at rest; empty for separately licensed data, or if nothing can draw."""
     if not isinstance(case, MuscleCase) or case.needed_data:
         return ""
     rest = of_case.setup(case)
@@ -244,7 +244,7 @@ def _pictures(case: Any) -> str:
 
 
 def _sections(records: dict[str, list[type[Record]]]) -> str:
-    """A section a name, with the first record's table and those that it is made of below it, each record once."""
+    """A section for each name: the table of its first record, then the tables of the records inside it, each record once."""
     made, seen = "", set()
     for name, of_it in records.items():
         for record in of_it:
@@ -269,7 +269,7 @@ def _row(name: str, field: Any) -> str:
 
 
 def _value(annotation: Any, metadata: Any = ()) -> str:
-    """What may stand as the value of a key, in words."""
+    """The allowed values of a key, in words."""
     unit, origin, inside = unit_of(metadata), get_origin(annotation), get_args(annotation)
     if rule := _rule(annotation, metadata):
         return rule
@@ -305,7 +305,7 @@ def _many(value: str) -> str:
 
 
 def _bounds(metadata: Any) -> str:
-    """The bounds of a value, in brackets; empty where there are none."""
+    """The bounds of a value, in brackets; empty if there are none."""
     bounds = [
         f"{sign} {getattr(one, key):g}" for one in metadata for of, (key, sign) in _BOUNDS.items() if type(one) is of
     ]
@@ -315,7 +315,7 @@ def _bounds(metadata: Any) -> str:
 
 
 def _rule(annotation: Any, metadata: Any) -> str:
-    """What a text must be, in the words of the checks that refuse an empty one; empty where none does."""
+    """The rule for a text, in the words of the check that refuses an empty text; empty if no check does."""
     checks = [getattr(entry, "func", None) for entry in metadata]
     if length_unit in checks:
         return f"unit of length: {', '.join(f'`"{unit}"`' for unit in LENGTH_UNITS)}"
@@ -328,14 +328,14 @@ def _rule(annotation: Any, metadata: Any) -> str:
 
 
 def _and_below(record: type[Record]) -> Iterator[type[Record]]:
-    """A record and every record that its keys are made of; effects have pages of their own."""
+    """A record and all records inside it."""
     yield record
     for field in _fields(record).values():
         yield from (inner for kind in _kinds(field.annotation) for inner in _and_below(kind))
 
 
 def _fields(record: type[Record]) -> dict[str, Any]:
-    """The fields of a record by the keys that files have."""
+    """The fields of a record by their keys in files."""
     named = {field.alias or name: field for name, field in record.model_fields.items()}
     return {key: named[key] for key in keys(record)}
 
@@ -348,7 +348,7 @@ def _kinds(annotation: Any) -> Iterator[type[Record]]:
 
 
 def _markdown(docstring: str) -> str:
-    """A docstring as Markdown: its roles are plain code, its double backticks single ones."""
+    """A docstring as Markdown: roles become plain code, double backticks single backticks."""
     return re.sub(r":\w+:`~?([^`]+)`", r"`\1`", docstring).replace("``", "`")
 
 

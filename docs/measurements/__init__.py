@@ -1,4 +1,4 @@
-"""Tables of the documentation: what is kept of each measurement, and the rows that a page shows of it."""
+"""Tables of the documentation: the stored part of each measurement, and its rows on a page."""
 
 from measurements import cases, evidence, fibres, hard, solvers
 from measurements.tables import KEPT, Measurement, kept, origin

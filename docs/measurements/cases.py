@@ -1,4 +1,4 @@
-"""A case beside its candidates, without its effects, with uncertain parameters, and error against time."""
+"""Measurements of cases: comparison with candidates, omitted effects, uncertain parameters, and error against time."""
 
 from dataclasses import fields
 from functools import partial
@@ -116,7 +116,7 @@ def _collagen(found: dict[str, Any]) -> Any:
 
 
 def _collagen_rows() -> str:
-    """By case the change of each statistic ± its error bar; KeyError where one is missing."""
+    """For each case, the change of each statistic ± its error bar; KeyError if one is missing."""
     rows = []
     for case, one in kept("collagen")["measured"].items():
         found = ((one["changes"][key], one["bars"][key]) for key in _MOVED)

@@ -13,7 +13,7 @@ from measurements.tables import Measurement, kept, number, table
 _BESIDE = ("measurement", "model")
 _RESTS = "source of the measured number"
 _ARMS = ("mean", "least", "greatest")
-# Frames of a hip that turns from rest to -0.3 rad and on to 0.3 rad, a hundredth of a radian a frame.
+# Frames of a hip that rotates from rest to -0.3 rad and then to 0.3 rad, 0.01 rad per frame number.
 _POSES = {30: "at -17 degrees", 60: "at rest", 90: "at 17 degrees"}
 _TURNED = (
     "./fem run CASE --set muscle.refinements=0 --set expect=[] --set frames.last=90 --set bone[2].motion.axis={} --set "
@@ -32,7 +32,7 @@ def _bodies(found: dict[str, Any]) -> Any:
 
 
 def _bodies_rows() -> str:
-    """By entry the value, that of the coarser mesh with half the load steps, and the measured one."""
+    """For each entry, the value, the value on the coarser mesh with half as many load steps, and the measured value."""
     rows, several = [], (row["beside"] for row in kept("credibility")["measured"]["rows"])
     beside = {one["name"]: one for own in several for one in own}
     for one in kept("bodies")["measured"]:
@@ -97,7 +97,7 @@ def _credibility(found: dict[str, Any]) -> Any:
 
 
 def _credibility_grades() -> str:
-    """By quantity what measurements of muscle say."""
+    """For each quantity, the evidence from measurements of muscle."""
     rows = []
     for one, claim in zip(kept("credibility")["measured"]["rows"], credibility.claims(), strict=True):
         met, models = (f"{one[kind]['met']} of {one[kind]['of']}" if one[kind]["of"] else "none" for kind in _BESIDE)
@@ -116,7 +116,7 @@ def _credibility_grades() -> str:
 
 
 def _credibility_verified() -> str:
-    """By quantity what verifies it by the catalogue as it is."""
+    """For each quantity, the entries of the current catalogue that verify it."""
     rows, groups = [], list(runner.entries().values())
     for claim in credibility.claims():
         behind = credibility.verifying(claim, groups)
@@ -167,7 +167,7 @@ def _rests(one: dict[str, Any]) -> str:
 
 
 def _recalled(text: str) -> str:
-    """Where a number was read; the page explains the word recalled."""
+    """The source from which a number was read; the page explains the word recalled."""
     return text.replace("from memory", "recalled").replace("memory", "recalled")
 
 
@@ -178,7 +178,7 @@ def _where(one: dict[str, Any]) -> str:
 
 
 def _credibility_sources() -> str:
-    """By source the specimens, and what of its measurements is within."""
+    """For each source, the specimens and the number of measurements that the model reproduces."""
     found = [one for row in kept("credibility")["measured"]["rows"] for one in row["beside"]]
     rows = []
     for name, record in experiments.experiments().items():

@@ -1,4 +1,4 @@
-"""Ends of fibres, and the answer of cases with other fibres."""
+"""Ends of fibres, and the results of cases with other fibres."""
 
 import re
 from collections.abc import Iterator
@@ -6,7 +6,7 @@ from typing import Any
 
 from measurements.tables import Measurement, kept, number, table
 
-# Ends of fibres by name, each with its distance from its attachment, as a fact of a mesh has them.
+# Ends of fibres by name, each with its distance from its attachment, as in the facts of a mesh.
 _FAR = re.compile(r"(first|last) end of fibre (\d+), [^:]*: ([\d.]+) mm")
 _ARMS = ("mean", "least", "greatest")
 _QUARTER = 50  # the frame at 0.5 rad
@@ -22,8 +22,8 @@ _NO_TENDON = (
     """--set fibres.complete=false --set 'attachment[2]={name="insertion",bone="femur",stiffness="100kPa/mm",outline={"""
     """file="data:hip/landmarks.csv",unit="mm",clouds=["LC_SET_Ins_1_R_M081_Glut_Max"],reach="5mm"}}'"""
 )
-_SHIPPED = "--error-bar"  # what is asked for of the fibres as shipped alone
-# By case, its fibres as shipped, others, and the setting of these.
+_SHIPPED = "--error-bar"  # the option of runs with the shipped fibres only
+# For each case, its shipped fibres, other fibres, and the setting of the latter.
 _CHOICES = {
     "hip_flexion": ("potential", "by area", _traced(25, ',flux="area"')),
     "hip_flexion_tendon": ("potential", "by area", _traced(25, ',flux="area"')),
@@ -71,7 +71,7 @@ def _fibre_ends_rows() -> str:
 
 
 def _fibre_choice(found: dict[str, Any]) -> Any:
-    """By case and fibres the mean length at rest, its change and the moment arms, with the error bars of the fibres as shipped."""
+    """For each case and its fibres, the mean length at rest, its change and the moment arms; error bars of the shipped fibres."""
     rows = []
     for command, one in found.items():
         case, _, option = command.partition(" ")
@@ -89,7 +89,7 @@ def _fibre_choice(found: dict[str, Any]) -> Any:
 
 
 def _values(rows: list[dict[str, Any]], of: str) -> dict[tuple[str, str, int], float]:
-    """By metric, statistic and frame the values of the reference's own change."""
+    """The values of the reference's own change, by metric, statistic and frame."""
     return {
         (one["metric"], one["statistic"], one["frame"]): one["value"]
         for one in rows
@@ -98,7 +98,7 @@ def _values(rows: list[dict[str, Any]], of: str) -> dict[tuple[str, str, int], f
 
 
 def _fibre_choice_rows() -> str:
-    """A row for each case: its fibres as shipped, and others."""
+    """A row for each case: its shipped fibres and other fibres."""
     by_case = dict[str, list[dict[str, Any]]]()
     for one in kept("fibre_choice")["measured"]:
         by_case.setdefault(one["case"], []).append(one)

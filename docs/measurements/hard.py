@@ -7,11 +7,11 @@ from typing import Any
 from fem_reference.assessment.stress import VERDICTS
 from measurements.tables import Measurement, kept, table
 
-# Ends of the reference in other numbers of load steps, as a sentence of the verb stress has them.
+# Final states of the reference with other numbers of load steps, as in the sentences of the verb stress.
 _ENDS = re.compile(r"end state at frame (\d+) by number of load steps: (.*?)(?:$|;)")
 _END = re.compile(r"(\d+): (?:([\d.e+-]+) % from that of (\d+)|([a-z ]+))")
 _STEPS = ("1", "10", "40")
-# Runs on other meshes, as a sentence of the verb stress has them.
+# Runs on other meshes, as in the sentences of the verb stress.
 _MESHES = re.compile(
     r"on other meshes: ((?:\d+ [a-z ]+(?:, )?)+), up to frame ([\d to]+), apart by (\S+) % at most, (\S+) % in"
 )
@@ -68,7 +68,7 @@ def _hard_programs(found: dict[str, Any]) -> Any:
 
 
 def _hard_programs_rows() -> str:
-    """By case the verdict on each program, where one of them takes what acts."""
+    """For each case that a program accepts, the verdict on each program."""
     cells = kept("stress_programs")["measured"]
     programs = list(dict.fromkeys(one["solver"] for one in cells))
     taken = dict.fromkeys(one["case"] for one in cells if one["verdict"] != "not applicable")
@@ -88,7 +88,7 @@ def _hard_verdict(one: dict[str, Any]) -> str:
 
 
 def _hard_programs_left_out() -> str:
-    """By reason the cases that programs do not take."""
+    """For each reason, the cases that programs do not accept."""
     found = dict[str, dict[str, list[str]]]()
     for one in kept("stress_programs")["measured"]:
         if one["verdict"] == "not applicable":
@@ -117,7 +117,7 @@ def _stress_steps() -> str:
 
 
 def _jitters(found: dict[str, Any]) -> Any:
-    """By case, the status on its own mesh, and runs on other meshes; none where a run takes too long."""
+    """For each case, the status on its own mesh and the runs on other meshes; None if a run takes too long."""
     rows = []
     for cell in (cell for one in found.values() for cell in one["cells"]):
         said = _MESHES.search(cell["sentence"])

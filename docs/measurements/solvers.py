@@ -24,7 +24,7 @@ def _solvers(found: dict[str, Any]) -> Any:
 
 
 def _solvers_on_muscles(name: str) -> str:
-    """A table of a time, or of one statistic in the worst frame, by solver and muscle; of the reference its error bars."""
+    """A table by solver and muscle of a time, or of one statistic in the worst frame; for the reference, its error bars."""
     measured = kept("table_5_1")["measured"]
     cases = list(dict.fromkeys(one["case"] for one in measured))
     rows = []
@@ -52,7 +52,7 @@ def _standings(found: dict[str, Any]) -> Any:
 
 
 def _standings_rows(file: str) -> str:
-    """By solver its error on each case; in bold where it is no answer."""
+    """The error of each solver on each case; in bold the reason if there is no answer."""
     rows = [row for row in kept(file)["measured"] if row["rms"] is not None or _failed(row)]
     cases = list(dict.fromkeys(row["case"] for row in rows))
     found = []
@@ -76,7 +76,7 @@ def _failed(row: dict[str, Any]) -> bool:
 
 
 def _learned_rows() -> str:
-    """By solver its mean distance on poses and on shapes that were not learned from."""
+    """The mean error of each solver on poses and on shapes that were not used in training."""
     rows = kept("learned")["measured"]
     counts = {row["split"]: f"{row['split']}s not seen in training, {row['muscles']} muscles" for row in rows}
     found = []
@@ -94,7 +94,7 @@ def _learned_rows() -> str:
 
 
 def _standings_parts(file: str) -> str:
-    """By program with a law of its own, the parts of its error on each case that could be split."""
+    """For each program that states its law, the parts of its error on each case where it could be split."""
     rows = [row for row in kept(file)["measured"] if row["split"]]
     names = list(dict.fromkeys(name for row in rows for name in row["split"]))
     found = [
