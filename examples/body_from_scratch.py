@@ -1,6 +1,6 @@
-"""A body without a scene file: points and cells by hand, a displacement that is prescribed, and the moment that it takes.
+"""A body without a scene file: points and cells in Python, a prescribed displacement, and the moment that it requires.
 
-A bar of square section is twisted by one degree; in small strain its torque is 0.1406 mu a^4 theta / L, free to warp
+A bar of square section, free to warp, is twisted by one degree; in small strain its torque is 0.1406 mu a^4 theta / L
 (Timoshenko and Goodier 1970).
 """
 
@@ -12,7 +12,7 @@ import fem_reference as fr
 
 SIDE, LENGTH, MU, ANGLE, ACROSS, ALONG = 10.0, 30.0, 0.01, np.deg2rad(1.0), 6, 8  # mm, mm, MPa, rad
 
-# Points of a grid, and each of its boxes cut into six tetrahedra along its diagonal.
+# The points of a grid, and its boxes, each cut into six tetrahedra along its diagonal.
 shape = (ACROSS + 1, ACROSS + 1, ALONG + 1)
 unit = np.indices(shape).reshape(3, -1).T / np.subtract(shape, 1)
 points = unit * [SIDE, SIDE, LENGTH] - [SIDE / 2, SIDE / 2, 0]
@@ -31,16 +31,16 @@ def face(height: float) -> np.ndarray:
 
 
 def twist(rest: np.ndarray, frame: float) -> np.ndarray:
-    """Turned about z by a share of the angle."""
+    """Displacements (n, 3) [mm] of a rotation about z by the angle times ``frame``."""
     c, s = np.cos(frame * ANGLE) - 1, np.sin(frame * ANGLE)
     return np.stack([c * rest[:, 0] - s * rest[:, 1], s * rest[:, 0] + c * rest[:, 1], 0 * rest[:, 0]], axis=1)
 
 
 mesh = fr.Cells(points, cells, "tetrahedron", 1, {"bottom": face(0.0), "top": face(LENGTH)})
 effects = (fr.make_effect("neo_hooke", mu=MU), fr.make_effect("incompressible", bulk=1000 * MU))
-bottom = fr.Prescribed("bottom", "bottom", (0, 1), lambda rest, _: 0 * rest)  # free to warp along z ...
+bottom = fr.Prescribed("bottom", "bottom", (0, 1), lambda rest, _: 0 * rest)  # free to warp along z,
 middle = fr.Prescribed("top", "top", (0, 1), twist)
-still = fr.Prescribed("still", "bottom", (2,), lambda rest, _: 0 * rest, stiffness=1e-6)  # ... but for weak springs
+still = fr.Prescribed("still", "bottom", (2,), lambda rest, _: 0 * rest, stiffness=1e-6)  # except for weak springs
 solved = fr.solve_body(fr.Body(mesh, effects, (bottom, middle, still), frames=(0.0, 1.0)), first_step=1)
 torque = 0.1406 * MU * SIDE**4 * ANGLE / LENGTH
 print("torque [N mm]:", solved.last.moments["top"][2], "in small strain:", torque)

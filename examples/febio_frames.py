@@ -1,7 +1,7 @@
-"""Frames from a run of FEBio on a mesh of its own: FEBio's log of node positions, carried to the vertices of the muscle's surface.
+"""Frames from a run of FEBio on another mesh: node positions from FEBio's log, interpolated at the vertices of the surface.
 
-In FEBio's file: <logfile><node_data data="x;y;z" delim="," file="nodes.txt"/></logfile>. Here another tetrahedral mesh and a log
-of an affine motion stand for a run, so that the result is known.
+FEBio's file needs <logfile><node_data data="x;y;z" delim="," file="nodes.txt"/></logfile>. Here another tetrahedral mesh and a log
+of an affine motion replace a run, so that the result is known.
 """
 
 from pathlib import Path
@@ -13,11 +13,11 @@ from scipy.spatial import cKDTree
 
 import fem_reference as fr
 
-NEAR = 30  # tetrahedra whose middles are nearest to a vertex, among which the one that contains it is looked for
+NEAR = 30  # the number of tetrahedra near a vertex that are searched for the one that contains it
 
 
 def shares(vertices: np.ndarray, nodes: np.ndarray, tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For each vertex (v, 3) the tetrahedron (v, 4) that contains it, or is nearest, and its share of each corner (v, 4)."""
+    """For each vertex (v, 3) the tetrahedron (v, 4) that contains it, or the nearest, and its barycentric coordinates (v, 4)."""
     _, near = cKDTree(nodes[tets].mean(axis=1)).query(vertices, min(NEAR, len(tets)))
     corners = nodes[tets[near]]  # (v, k, 4, 3)
     edges = np.swapaxes(corners[:, :, 1:] - corners[:, :, :1], 2, 3)
@@ -28,7 +28,7 @@ def shares(vertices: np.ndarray, nodes: np.ndarray, tets: np.ndarray) -> tuple[n
 
 
 def positions(log: str) -> dict[float, np.ndarray]:
-    """By time the positions (n, 3) of the nodes in their order, from FEBio's log."""
+    """Positions (n, 3) of the nodes in their order, for each time in FEBio's log."""
     found = {}
     for block in log.split("*Step")[1:]:
         rows = [line.split(",") for line in block.splitlines() if line[:1].isdigit()]
@@ -38,7 +38,7 @@ def positions(log: str) -> dict[float, np.ndarray]:
 
 
 if __name__ == "__main__":
-    case, rest = make(), meshio.read("my_muscle/muscle.ply")  # in mm, as the model in FEBio
+    case, rest = make(), meshio.read("my_muscle/muscle.ply")  # in mm, like the model in FEBio
     box = fr.box((6, 6, 12), (40.0, 40.0, 80.0), "tetrahedron")
     nodes, tets = box.points - [20, 20, 10], box.cells  # or meshio.read("mesh.vtk"): points and cells_dict["tetra"]
     motion = np.array([[0.0, 0.0, 0.1], [0.0, 0.02, 0.0], [0.0, 0.05, -0.04]])
@@ -55,4 +55,4 @@ if __name__ == "__main__":
         meshio.Mesh(points, rest.cells).write(f"febio/frame_{round(time):04d}.ply", binary=True)
     mine = fr.read_run("febio", case)  # and fem-reference compare my_muscle --candidate febio
     print("largest error [mm]:", abs(mine.positions[-1] - (rest.points + rest.points @ motion.T)).max().round(9))
-# Ends in 0 within 1e-6: linear interpolation carries an affine motion exactly; files have single precision at worst.
+# Ends in 0 within 1e-6: linear interpolation reproduces an affine motion exactly; files have at least single precision.

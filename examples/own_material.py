@@ -1,6 +1,6 @@
-"""A material of one's own, in a file outside the package: effects/yeoh.py beside this script, which stretches a block of it.
+"""A material law of your own, in a file outside the package: effects/yeoh.py. A block of this material is stretched.
 
-FEM_REFERENCE_EFFECTS lists folders of such files; scene files name them as they name any effect.
+FEM_REFERENCE_EFFECTS lists folders of such files; scene files name these effects like any other effect.
 """
 
 import os
@@ -26,4 +26,4 @@ over = STRETCH**2 + 2 / STRETCH - 3
 exact = 100 * 2 * (STRETCH - STRETCH**-2) * (C1 + 2 * C2 * over + 3 * C3 * over**2)
 print("force [N]:", solved.last.forces["top"][2], "exact:", exact)
 print("ratio:", solved.last.forces["top"][2] / exact)
-# Ends in 1 within 5e-4: closed form, but for a bulk modulus of 10^4 shear moduli.
+# Ends in 1 within 5e-4: closed form of incompressible material; here the bulk modulus is 10^4 shear moduli.

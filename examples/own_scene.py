@@ -1,4 +1,4 @@
-"""A scene of one's own: a muscle as a closed triangle mesh between two bones, and how far position based dynamics is off."""
+"""A scene of your own: a muscle as a closed triangle mesh between two bones, and the error of position based dynamics."""
 
 from pathlib import Path
 
@@ -42,9 +42,9 @@ def spindle(around: int = 20, along: int = 21, length: float = 60.0) -> meshio.M
 
 
 def make(folder: str = "my_muscle") -> fr.Case:
-    """The folder my_muscle, which "fem-reference run my_muscle" and the other examples solve too."""
+    """Write the scene into ``folder`` and read it; "fem-reference run my_muscle" and the other examples solve it too."""
     Path(folder).mkdir(exist_ok=True)
-    if not Path(folder, "muscle.ply").exists():  # meshio writes the time into it, and runs are stored by content
+    if not Path(folder, "muscle.ply").exists():  # meshio writes the time into it, so a new file would be solved again
         spindle().write(f"{folder}/muscle.ply")
     Path(folder, "case.toml").write_text(SCENE, encoding="utf-8")
     return fr.load_case(folder)
@@ -56,4 +56,4 @@ if __name__ == "__main__":
     case = make()
     result = fr.compare(case, fr.solve(case, progress=print), [fr.solve(case, "pbd", **PBD)])
     print("greatest deviation of pbd [mm]:", result["pbd", "surface_deviation", "max"].values.max())
-# Ends in 1.75 within 0.0875: pinned: by a mesh that gmsh makes.
+# Ends in 1.75 within 0.0875: pinned; the mesh is made by gmsh.

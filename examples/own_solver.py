@@ -1,6 +1,6 @@
-"""A solver of one's own as a candidate: each vertex follows the bone by its share of the way along the muscle (skinning).
+"""A solver of your own as a candidate: each vertex follows the lower bone by a fraction that depends on its height (skinning).
 
-It writes a mesh for each frame, as a program in any language would, and is measured against the finite element reference.
+It writes a mesh for each frame, as a program in any language could, and is compared with the finite element reference.
 """
 
 from pathlib import Path
@@ -13,7 +13,7 @@ import fem_reference as fr
 
 
 def write_frames(case: fr.Case, folder: str, share_at_end: float = 1.0) -> None:
-    """The frames of the solver; bones turn by 15 degrees over 20 frames about x through (0, 25, 0)."""
+    """Write the frames of the solver; the lower bone rotates by 15 degrees over 20 frames about x through (0, 25, 0) mm."""
     rest = meshio.read("my_muscle/muscle.ply")
     share = share_at_end * (1 - rest.points[:, 2:] / rest.points[:, 2].max())
     Path(folder).mkdir(exist_ok=True)
@@ -34,5 +34,5 @@ if __name__ == "__main__":
         measure = result[mine.name, metric, statistic]
         print(metric, statistic, measure.values.round(3), measure.unit)
     print("page:", fr.write_report(result, "my_page"))
-    print("worst deviation of my solver [mm]:", result[mine.name, "surface_deviation", "max"].values.max())
+    print("greatest deviation of my solver [mm]:", result[mine.name, "surface_deviation", "max"].values.max())
 # Ends in 4.24 within 0.0848: pinned.

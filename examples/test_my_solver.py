@@ -1,6 +1,6 @@
-"""A regression check in pytest: that my solver is what it was, and no further from the reference than its baseline allows.
+"""A regression test in pytest: my solver has not changed, and is no further from the reference than its baseline allows.
 
-Run it as "pytest test_my_solver.py" in a folder of its own. In a project of yours the baseline is a file that is committed.
+Run "pytest test_my_solver.py" in a separate folder. In your own project the baseline is a committed file.
 """
 
 import subprocess
@@ -19,7 +19,7 @@ def check(*words: str) -> int:
 
 @pytest.fixture(scope="module")
 def case():
-    """The scene, and a baseline of the solver as it is."""
+    """The scene, with a baseline of the unchanged solver."""
     made = make()
     write_frames(made, "my_solver")
     assert check("--update") == 0
@@ -27,12 +27,12 @@ def case():
 
 
 def test_my_solver_is_as_good_as_it_was(case):
-    """Nothing was changed."""
+    """The solver is unchanged, so the check passes."""
     write_frames(case, "my_solver")
     assert check("--markdown", "check.md", "--junit", "check.xml") == 0
 
 
 def test_a_mistake_in_my_solver_is_found(case):
-    """Which the lower end of the muscle shows."""
+    """The mistake displaces the lower end of the muscle, so the check fails."""
     write_frames(case, "my_solver", share_at_end=0.9)
     assert check() == 1

@@ -1,10 +1,10 @@
-"""Laws of the isochoric stretch along the fibre, ``lambdabar = J^(-1/3) |F a|``: muscle passive and active.
+"""Laws of the isochoric stretch along the fibre, ``lambdabar = J^(-1/3) |F a|``: passive and active muscle.
 
-They are laws as in ``validation/laws.py``, with
+They have the form of ``validation/laws.py``, with
 
     d lambdabar / dF = J^(-1/3) (F a (x) a / lambda - lambda/3 F^-T),  lambda = |F a|.
 
-No reading error: the numbers follow from the formulas.
+No digitisation error: the numbers follow from the formulas.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ class FibreLaw:
     """A law of the isochoric stretch along the fibre alone, ``W(lambdabar)``."""
 
     def stored(self, stretch: float) -> float:
-        """``W`` [MPa] at an isochoric stretch of the fibre."""
+        """``W`` [MPa] at an isochoric ``stretch`` of the fibre."""
         raise NotImplementedError(f"{type(self).__name__} has no energy")
 
     def slope(self, stretch: float) -> float:
@@ -27,7 +27,7 @@ class FibreLaw:
         raise NotImplementedError(f"{type(self).__name__} has no slope")
 
     def energy(self, F: Floats, fibre: Floats) -> float:
-        """Energy per rest volume [MPa]."""
+        """Energy per unit rest volume [MPa]."""
         return self.stored(float(np.linalg.det(F) ** (-1 / 3) * np.linalg.norm(F @ fibre)))
 
     def stress(self, F: Floats, fibre: Floats) -> Floats:
@@ -52,7 +52,7 @@ class FibrePassive(FibreLaw):
 
     @property
     def _line(self) -> tuple[float, float]:
-        """p3 and p4."""
+        """The coefficients p3 and p4."""
         p3 = self.p1 * self.p2 * np.exp(self.p2 * (self.linear_from - 1))
         return p3, self.p1 * np.expm1(self.p2 * (self.linear_from - 1)) - p3 * self.linear_from
 
@@ -75,7 +75,7 @@ class FibrePassive(FibreLaw):
 @dataclass(frozen=True)
 class FibrePassiveFebio(FibreLaw):
     """``lambdabar dW/dlambdabar`` is 0 for ``lambdabar <= 1``, ``c3 (exp(c4 (lambdabar - 1)) - 1)`` up to ``linear_from`` and
-    ``c5 lambdabar + c6`` beyond, continuous (c6 follows); c3, c5 [MPa].
+    ``c5 lambdabar + c6`` beyond; c6 makes it continuous; c3, c5 [MPa].
 
     Source: Weiss, Maker, Govindjee 1996, doi 10.1016/0045-7825(96)01035-3; FEBio theory manual, transversely isotropic
     Mooney-Rivlin. The toe's energy is an exponential integral.
@@ -88,7 +88,7 @@ class FibrePassiveFebio(FibreLaw):
 
     @property
     def c6(self) -> float:
-        """What makes the force continuous [MPa]."""
+        """The constant [MPa] that makes the force continuous."""
         return float(self.c3 * np.expm1(self.c4 * (self.linear_from - 1)) - self.c5 * self.linear_from)
 
     def stored(self, stretch: float) -> float:

@@ -2,7 +2,7 @@
 
 Source: Johnson 1985, Contact Mechanics, ch. 3.4 and 4.2, doi 10.1017/CBO9781139171731; after Hertz 1882,
 doi 10.1515/crll.1882.92.156.
-No reading error; the model is valid while the contact is small beside the spheres, to a part of the order of ``(a / R)^2``.
+No digitisation error; for a contact that is small compared with the spheres the relative error is of the order of ``(a / R)^2``.
 """
 
 import math
@@ -55,7 +55,7 @@ class Hertz:
 
     @property
     def approach(self) -> float:
-        """How much nearer distant points of the two bodies are [mm]: ``a^2 / R``."""
+        """The distance by which remote points of the two bodies approach each other [mm]: ``a^2 / R``."""
         return self.contact_radius**2 / self.radius
 
     @property
@@ -64,11 +64,11 @@ class Hertz:
         return 3 * self.force / (2 * math.pi * self.contact_radius**2)
 
     def pressure(self, distance: Floats) -> Floats:
-        """[MPa] at a ``distance`` [mm] from the centre: ``p0 sqrt(1 - (r/a)^2)``, zero outside."""
+        """The pressure [MPa] at a ``distance`` [mm] from the centre: ``p0 sqrt(1 - (r/a)^2)``, zero outside."""
         return self.peak_pressure * np.sqrt(np.maximum(1 - (distance / self.contact_radius) ** 2, 0))
 
     def sunk(self, side: Side, distance: Floats) -> Floats:
-        """How far the surface of ``side`` yields [mm] at a ``distance`` r [mm]: with ``q = (1 - nu^2)/E p0 / (2 a)``,
+        """The depression of the surface of ``side`` [mm] at a ``distance`` r [mm]: with ``q = (1 - nu^2)/E p0 / (2 a)``,
         ``q pi/2 (2 a^2 - r^2)`` in the contact, ``q ((2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2))`` outside.
         """
         a = self.contact_radius
@@ -78,14 +78,14 @@ class Hertz:
 
 
 def rigid_sphere(radius: float, young: float, poisson: float, force: float) -> Hertz:
-    """A rigid sphere of ``radius`` [mm] pressed by ``force`` [N] into a half-space of ``young`` [MPa] and ``poisson``, which is
-    the ``second`` body.
+    """A rigid sphere of ``radius`` [mm] pressed by ``force`` [N] into a half-space, the ``second`` body, with ``young`` [MPa] and
+    ``poisson``.
     """
     return Hertz(Side(radius, math.inf, 0.0), Side(math.inf, young, poisson), force)
 
 
 def force_at(radius: float, young: float, poisson: float, approach: float) -> float:
-    """The force [N] that presses a rigid sphere of ``radius`` R [mm] by ``approach`` d [mm] into a half-space:
+    """The force [N] that presses a rigid sphere of ``radius`` R [mm] into a half-space by ``approach`` d [mm]:
     ``4/3 E* sqrt(R) d^(3/2)``, ``E* = young / (1 - poisson^2)``.
     """
     return 4 / 3 * young / (1 - poisson**2) * math.sqrt(radius * approach) * approach

@@ -1,9 +1,9 @@
-"""Homogeneous states of a body of a law (``validation/laws.py``) and a finite bulk modulus, ``W(F) + K/2 (J - 1)^2``.
+"""Homogeneous states of a body with a law (``validation/laws.py``) and a finite bulk modulus: ``W(F) + K/2 (J - 1)^2``.
 
-Stretches along which no stress acts are found by root finding, to 1e-13 of the bulk modulus in what remains of the stress. The
-mixed form ``p (J - 1) - p^2 / (2 K)`` has the same states, with ``p = K (J - 1)``.
+Free stretches, along which no stress acts, are found by root finding until the residual stress is at most 1e-13 of the bulk
+modulus. The mixed form ``p (J - 1) - p^2 / (2 K)`` has the same states, with ``p = K (J - 1)``.
 
-Source: Ogden 1984, Non-linear Elastic Deformations, ch. 4.3 (the homogeneous deformations). No reading error.
+Source: Ogden 1984, Non-linear Elastic Deformations, ch. 4.3 (homogeneous deformations). No digitisation error.
 """
 
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ FREE = np.nan
 
 @dataclass(frozen=True, eq=False)
 class Homogeneous:
-    """A state: the deformation gradient ``F`` and the nominal (first Piola-Kirchhoff) stress ``P`` [MPa], (3, 3) each."""
+    """A state: the deformation gradient ``F`` and the nominal (first Piola-Kirchhoff) stress ``P`` [MPa], each (3, 3)."""
 
     F: Floats
     P: Floats
 
     @property
     def stretches(self) -> Floats:
-        """Along x, y, z, (3,)."""
+        """The stretches along x, y, z, (3,)."""
         return np.diag(self.F)
 
 
@@ -41,7 +41,7 @@ def uniaxial(law: Law, bulk: float, stretch: float, fibre: Floats = X) -> Homoge
 
 
 def equibiaxial(law: Law, bulk: float, stretch: float, fibre: Floats = X) -> Homogeneous:
-    """Stretched alike along x and y, free along z; the stresses are ``P[0, 0]`` and ``P[1, 1]``."""
+    """Stretched equally along x and y, free along z; the stresses are ``P[0, 0]`` and ``P[1, 1]``."""
     return _fixed(law, bulk, fibre, (stretch, stretch, FREE))
 
 
@@ -51,7 +51,7 @@ def planar(law: Law, bulk: float, stretch: float, fibre: Floats = X) -> Homogene
 
 
 def simple_shear(law: Law, bulk: float, amount: float, fibre: Floats = X) -> Homogeneous:
-    """``x = X + amount Y``, everything fixed: no volume changes, nothing is free; the shear stress is ``P[0, 1]``."""
+    """Simple shear ``x = X + amount Y`` at constant volume, with no free stretch; the shear stress is ``P[0, 1]``."""
     F = np.eye(3)
     F[0, 1] = amount
     return Homogeneous(F, nominal_stress(law, bulk, F, fibre))
@@ -60,7 +60,7 @@ def simple_shear(law: Law, bulk: float, amount: float, fibre: Floats = X) -> Hom
 def pulled(law: Law, bulk: float, nominal: float, fibre: Floats = X) -> Homogeneous:
     """Pulled along x by a ``nominal`` stress [MPa], free along y and z; 0 for a muscle that shortens freely.
 
-    Where several states carry the same stress, that which is reached from none by pulling more and more.
+    If several states have the same stress, the result is the state that is reached when the stress increases from 0.
     """
     state = _fixed(law, bulk, fibre, (FREE, FREE, FREE))
     for share in np.linspace(0, 1, 33)[1:] if nominal else ():
@@ -76,8 +76,8 @@ def _fixed(
     nominal: float = 0.0,
     guess: Floats | None = None,
 ) -> Homogeneous:
-    """The state at stretches along x, y, z, where those that are ``FREE`` carry no stress, but ``nominal`` along a free x;
-    ``guess``: the logarithms of the free ones.
+    """The state at ``stretches`` along x, y, z. Along a ``FREE`` stretch the stress is 0, except along x, where it is ``nominal``;
+    ``guess``: the logarithms of the free stretches.
     """
     given = np.array(stretches)
     free = np.isnan(given)

@@ -1,14 +1,13 @@
-"""The benchmark of cardiac mechanics: three problems whose answers eleven groups agree on.
+"""The benchmark of cardiac mechanics: three problems on whose results eleven groups agree.
 
 Source: Land et al., Verification of cardiac mechanics software, Proc. R. Soc. A 471 (2015) 20150641, doi
-10.1098/rspa.2015.0641. Units: mm, N, MPa (the paper has kPa). In all three the material is incompressible and the load is a
-pressure of the fluid outside: it acts along the inward normal of the deformed surface, the force per deformed area (a
-follower load).
+10.1098/rspa.2015.0641. Units: mm, N, MPa (the paper has kPa). In all problems the material is incompressible and the load is a
+fluid pressure: a force per deformed area along the inward normal of the deformed surface (a follower load).
 
 The passive law is Guccione's, ``W = C/2 (e^Q - 1)``, ``Q = b_f E_ff^2 + b_t (E_ss^2 + E_nn^2 + 2 E_sn^2) + 2 b_fs (E_fs^2 +
-E_fn^2)``, E the Green-Lagrange strain in the directions f, s, n of the fibre and two across it (f is all that Q feels of them).
+E_fn^2)``, E the Green-Lagrange strain in the fibre direction f and two directions s, n across it, whose choice does not matter.
 The active stress of problem 3 is a second Piola-Kirchhoff stress ``T_a f f^T``, f the unit fibre direction at rest: an energy
-``T_a/2 (f . C f - 1)`` per rest volume.
+``T_a/2 (f . C f - 1)`` per unit rest volume.
 """
 
 from dataclasses import dataclass
@@ -39,13 +38,13 @@ class Problem:
 
 
 # Problem 1: the beam 0 <= x <= 10, 0 <= y <= 1, 0 <= z <= 1 mm, fibres along x; x = 0 clamped; the pressure on all of z = 0, so
-# that the beam bends to +z. Asked for: the z of the material point (10, 0.5, 1), and the line (x, 0.5, 0.5).
+# that the beam bends towards +z. Results: z of the material point (10, 0.5, 1), and the line (x, 0.5, 0.5).
 BEAM = (10.0, 1.0, 1.0)
 BEAM_POINT = (10.0, 0.5, 1.0)
 PROBLEM_1 = Problem(Guccione(2e-3, 8.0, 2.0, 4.0), pressure=4e-6)
 
-# Problems 2 and 3: the wall between two half ellipsoids of revolution about z, below z = 5 mm; the whole base z = 5 mm clamped;
-# the pressure on the inside (endocardium). Asked for: the z of the two apices (0, 0, -17) and (0, 0, -20).
+# Problems 2 and 3: the wall between two truncated ellipsoids of revolution about z, below z = 5 mm; the base z = 5 mm clamped;
+# the pressure on the inside (endocardium). Results: z of the two apices (0, 0, -17) and (0, 0, -20).
 SHORT = (7.0, 10.0)
 LONG = (17.0, 20.0)
 BASE = 5.0
@@ -53,8 +52,8 @@ PROBLEM_2 = Problem(Guccione(10e-3, 1.0, 1.0, 1.0), pressure=10e-3)
 PROBLEM_3 = Problem(Guccione(2e-3, 8.0, 2.0, 4.0), pressure=15e-3, tension=60e-3)
 FIBRE_ANGLES = (90.0, -90.0)
 
-# What the codes agree on [mm], as it is handed down: the paper shows curves, and this is not measured off them anew (fenicsx-pulse
-# states 4.17 in its demonstration of problem 1). The band that the codes leave is wider than the last digit: finer solutions
+# Results [mm] on which the codes agree, as later publications quote them: the paper shows curves, which were not digitised again
+# (fenicsx-pulse states 4.17 in its demonstration of problem 1). The codes differ by more than the last digit: finer solutions
 # typically differ by 0.5 per cent (abstract), here of 5, 28 and 15 mm: 0.03, 0.15 and 0.1 mm.
 TIP_OF_BEAM = 4.17
 PASSIVE_APICES = (-26.6, -28.2)
@@ -62,20 +61,20 @@ ACTIVE_APICES = (-12.3, -15.4)
 
 
 def axes(depth: Floats) -> tuple[Floats, Floats]:
-    """Short and long semi-axis [mm] of the surface at ``depth`` t: ``7 + 3 t`` and ``17 + 3 t``, t = 0 endocardium, 1
-    epicardium.
+    """Short and long semi-axes [mm] of the surface at ``depth`` t: ``7 + 3 t`` and ``17 + 3 t``, with t 0 at the endocardium and 1
+    at the epicardium.
     """
     depth = np.asarray(depth, dtype=float)
     return SHORT[0] + (SHORT[1] - SHORT[0]) * depth, LONG[0] + (LONG[1] - LONG[0]) * depth
 
 
 def base_angle(depth: Floats) -> Floats:
-    """The u [rad] at which the surface at ``depth`` meets the base: ``-arccos(5 / long axis)``; at the apex u is -pi."""
+    """The angle u [rad] at which the surface at ``depth`` meets the base: ``-arccos(5 / long axis)``; at the apex u is -pi."""
     return -np.arccos(BASE / axes(depth)[1])
 
 
 def wall(u: Floats, v: Floats, depth: Floats) -> Floats:
-    """Points (n, 3) [mm] of the wall at the angles u in [-pi, base_angle] and v in [-pi, pi] and at ``depth``, (n,) each:
+    """Points (n, 3) [mm] of the wall at angles u in [-pi, base_angle] and v in [-pi, pi] and at ``depth``, each (n,):
     ``(s sin u cos v, s sin u sin v, l cos u)`` with the axes s and l.
     """
     short, long = axes(depth)
@@ -83,10 +82,10 @@ def wall(u: Floats, v: Floats, depth: Floats) -> Floats:
 
 
 def depth(points: Floats) -> Floats:
-    """How deep ``points`` (n, 3) [mm] lie in the wall, t (n,): where ``(x^2 + y^2) / (7 + 3 t)^2 + z^2 / (17 + 3 t)^2 = 1``.
+    """The depth t (n,) of ``points`` (n, 3) [mm] in the wall: the root of ``(x^2 + y^2) / (7 + 3 t)^2 + z^2 / (17 + 3 t)^2 = 1``.
 
-    Newton from a t that is too small: the left side falls in t and is convex, so that it comes up to the root from one side.
-    Good somewhat outside the wall too, not deep in the cavity, where no such surface passes.
+    Newton's method starts from a t that is too small. The left side is convex and falls with t, so t grows towards the root.
+    It also works somewhat outside the wall, but not deep in the cavity, through which no surface of this family passes.
     """
     points = np.asarray(points, dtype=float)
     radius, height = np.hypot(points[:, 0], points[:, 1]), np.abs(points[:, 2])
@@ -103,12 +102,12 @@ def depth(points: Floats) -> Floats:
 def fibre(points: Floats) -> Floats:
     """Unit fibre directions (n, 3) of problem 3 at rest points (n, 3) [mm] of the wall.
 
-    ``sin a x_u / |x_u| + cos a x_v / |x_v|``, x_u and x_v the derivatives of :func:`wall` and a the angle, linear in the depth
-    from +90 degrees inside to -90 degrees outside. x_u points from apex to base, and x_v, as sin u < 0, counter-clockwise seen
-    from +z; on the axis itself, where there is no x_v, counter-clockwise is y.
+    ``sin a x_u / |x_u| + cos a x_v / |x_v|``, with the derivatives x_u and x_v of :func:`wall` and the angle a, linear in the depth
+    from +90 degrees inside to -90 degrees outside. x_u points from apex to base and, because sin u < 0, x_v counter-clockwise
+    seen from +z. On the axis, where x_v is 0, its direction is taken as y.
 
-    Public codes differ in the hand of this helix (cardiac-geometries has u in [0, pi], so that x_u points down): the mirror image
-    of the body, whose apices are at the same z and which twists in the other direction.
+    Public codes differ in the handedness of this helix (cardiac-geometries has u in [0, pi], so that x_u points down). They solve
+    the mirror image of the body, whose apices have the same z and which twists in the other direction.
     """
     points = np.asarray(points, dtype=float)
     t = depth(points)

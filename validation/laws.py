@@ -1,15 +1,15 @@
-"""Energies and stresses of the laws that bodies are made of.
+"""Energies and stresses of the material laws.
 
-A law gives energy per rest volume [MPa] and first Piola-Kirchhoff stress [MPa] at a deformation gradient F (3, 3), with ``fibre``,
-the unit vector (3,) along the fibres at rest. Written for one point at a time: ``P = dW/dF`` by hand, with
+A law gives energy per unit rest volume [MPa] and first Piola-Kirchhoff stress [MPa] at a deformation gradient F (3, 3), with
+``fibre``, the unit vector (3,) along the fibres at rest. It evaluates one point at a time; ``P = dW/dF`` is derived by hand, with
 
     I1bar = J^(-2/3) tr C,  I2bar = J^(-4/3) ((tr C)^2 - tr C^2) / 2,
 
     d I1bar / dF = 2 J^(-2/3) (F - I1/3 F^-T)                      (Holzapfel 2000, Nonlinear Solid Mechanics, ch. 6.4)
     d I2bar / dF = 2 J^(-4/3) (I1 F - F C - 2/3 I2 F^-T)
 
-No reading error anywhere: the numbers follow from the formulas. Laws of the fibre alone are in ``validation/fibre_laws.py``, states
-of a body in ``validation/homogeneous.py``.
+No digitisation error: the numbers follow from the formulas. Laws of the fibre stretch alone are in ``validation/fibre_laws.py``,
+states of a body in ``validation/homogeneous.py``.
 """
 
 from dataclasses import dataclass
@@ -26,14 +26,14 @@ class Law(Protocol):
     """A material law: its energy and its stress."""
 
     def energy(self, F: Floats, fibre: Floats) -> float:
-        """Energy per rest volume [MPa]."""
+        """Energy per unit rest volume [MPa]."""
 
     def stress(self, F: Floats, fibre: Floats) -> Floats:
-        """First Piola-Kirchhoff stress (3, 3) [MPa], ``P[i, k]`` the force along i per rest area whose normal is k."""
+        """First Piola-Kirchhoff stress (3, 3) [MPa], ``P[i, k]`` the force along i per unit rest area with the normal k."""
 
 
 def _invariants(F: Floats) -> tuple[float, float, float]:
-    """J and the invariants I1 and I2, which are not isochoric."""
+    """J and the invariants I1 and I2 of C, not isochoric."""
     C = F.T @ F
     return np.linalg.det(F), np.trace(C), (np.trace(C) ** 2 - np.trace(C @ C)) / 2
 
@@ -49,7 +49,7 @@ class MooneyRivlin:
     c2: float
 
     def energy(self, F: Floats, fibre: Floats) -> float:  # noqa: ARG002
-        """Energy per rest volume [MPa]."""
+        """Energy per unit rest volume [MPa]."""
         J, I1, I2 = _invariants(F)
         return float(self.c1 * (J ** (-2 / 3) * I1 - 3) + self.c2 * (J ** (-4 / 3) * I2 - 3))
 
@@ -67,7 +67,7 @@ def neo_hooke(mu: float) -> MooneyRivlin:
 
 
 def isochoric(F: Floats, slope: Floats) -> Floats:
-    """First Piola-Kirchhoff stress (3, 3) [MPa] of an energy of ``Ebar = (J^(-2/3) C - I)/2`` whose ``slope`` in Ebar is S (3, 3):
+    """First Piola-Kirchhoff stress (3, 3) [MPa] of an energy of ``Ebar = (J^(-2/3) C - I)/2`` with derivative ``slope`` S (3, 3):
     ``J^(-2/3) (F S - (S : C)/3 F^-T)``. Source: Holzapfel 2000, Nonlinear Solid Mechanics, section 6.4.
     """
     part = np.sum(slope * (F.T @ F)) / 3
@@ -84,7 +84,7 @@ class ActiveTension:
     tension: float
 
     def energy(self, F: Floats, fibre: Floats) -> float:
-        """Energy per rest volume [MPa]."""
+        """Energy per unit rest volume [MPa]."""
         return float(self.tension / 2 * (np.linalg.det(F) ** (-2 / 3) * np.sum((F @ fibre) ** 2) - 1))
 
     def stress(self, F: Floats, fibre: Floats) -> Floats:
@@ -94,8 +94,8 @@ class ActiveTension:
 
 @dataclass(frozen=True)
 class HolzapfelOgden:
-    """Two families of fibres at +-``angle`` [rad] from the fibre, turned about the part of ``normal`` across it:
-    ``sum of k1/(2 k2) (exp(k2 (I4bar - 1)^2) - 1)`` where ``I4bar = J^(-2/3) |F a|^2 > 1``, else 0; k1 [MPa].
+    """Two families of fibres at +-``angle`` [rad] to the fibre, rotated about the component of ``normal`` across the fibre:
+    ``sum of k1/(2 k2) (exp(k2 (I4bar - 1)^2) - 1)`` if ``I4bar = J^(-2/3) |F a|^2 > 1``, else 0; k1 [MPa].
 
     Source: Holzapfel, Gasser, Ogden 2000, doi 10.1023/A:1010835316564.
     """
@@ -112,7 +112,7 @@ class HolzapfelOgden:
         return np.array([np.cos(self.angle) * fibre + side * np.sin(self.angle) * across for side in (1, -1)])
 
     def energy(self, F: Floats, fibre: Floats) -> float:
-        """Energy per rest volume [MPa]."""
+        """Energy per unit rest volume [MPa]."""
         squares = np.linalg.det(F) ** (-2 / 3) * np.sum((self.families(fibre) @ F.T) ** 2, axis=1)
         return float(np.sum(self.k1 / (2 * self.k2) * np.expm1(self.k2 * np.maximum(squares - 1, 0) ** 2)))
 
@@ -141,26 +141,26 @@ class Guccione:
     bfs: float
 
     def _along_axes(self, F: Floats, fibre: Floats) -> tuple[Floats, Floats, Floats]:
-        """Axes (3, 3), the fibre first, as columns; E in them; and the factor of each squared entry of it."""
+        """Axes (3, 3) as columns, the fibre first; E in these axes; and the factor of each squared entry of E."""
         axes = np.linalg.qr(np.column_stack([fibre, np.eye(3)]))[0]
         b = np.full((3, 3), self.bt)
         b[0, :], b[:, 0], b[0, 0] = self.bfs, self.bfs, self.bf
         return axes, axes.T @ (np.linalg.det(F) ** (-2 / 3) * F.T @ F - np.eye(3)) @ axes / 2, b
 
     def energy(self, F: Floats, fibre: Floats) -> float:
-        """Energy per rest volume [MPa]."""
+        """Energy per unit rest volume [MPa]."""
         _, E, b = self._along_axes(F, fibre)
         return float(self.c / 2 * np.expm1(np.sum(b * E**2)))
 
     def stress(self, F: Floats, fibre: Floats) -> Floats:
-        """First Piola-Kirchhoff stress (3, 3) [MPa]; the slope of the energy in E is ``c exp(Q) b E``."""
+        """First Piola-Kirchhoff stress (3, 3) [MPa]; the derivative of the energy with respect to E is ``c exp(Q) b E``."""
         axes, E, b = self._along_axes(F, fibre)
         return isochoric(F, axes @ (self.c * np.exp(np.sum(b * E**2)) * b * E) @ axes.T)
 
 
 @dataclass(frozen=True)
 class Prestretched:
-    """``law`` at ``F Fp``, ``Fp = l a (x) a + l^(-1/2) (I - a (x) a)``: at rest its fibres are stretched by l = ``stretch``.
+    """``law`` at ``F Fp``, ``Fp = l a (x) a + l^(-1/2) (I - a (x) a)``: at rest its fibres have the stretch l = ``stretch``.
 
     Source: multiplicative split as in Rodriguez, Hoger, McCulloch 1994, doi 10.1016/0021-9290(94)90021-3.
     """
@@ -173,7 +173,7 @@ class Prestretched:
         return np.asarray(self.stretch * along + self.stretch**-0.5 * (np.eye(3) - along))
 
     def energy(self, F: Floats, fibre: Floats) -> float:
-        """Energy per rest volume [MPa]."""
+        """Energy per unit rest volume [MPa]."""
         return self.law.energy(F @ self._fitted(fibre), fibre)
 
     def stress(self, F: Floats, fibre: Floats) -> Floats:
@@ -189,7 +189,7 @@ class Together:
     laws: tuple[Law, ...]
 
     def energy(self, F: Floats, fibre: Floats) -> float:
-        """Energy per rest volume [MPa]."""
+        """Energy per unit rest volume [MPa]."""
         return sum(law.energy(F, fibre) for law in self.laws)
 
     def stress(self, F: Floats, fibre: Floats) -> Floats:

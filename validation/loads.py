@@ -1,14 +1,14 @@
-"""Neo-Hookean blocks under plates, weights and pressure: ``mu/2 (I1bar - 3) + K/2 (J - 1)^2`` with a finite bulk modulus K.
+"""Neo-Hookean blocks under plates, weight and pressure: ``mu/2 (I1bar - 3) + K/2 (J - 1)^2`` with a finite bulk modulus K.
 
 Derived here from the energy by hand (Holzapfel 2000, Nonlinear Solid Mechanics, ch. 6.4: stress of a decoupled energy), as scalar
-equations; roots to rounding. No reading error. ``mu`` and ``bulk`` [MPa].
+equations; roots to rounding. No digitisation error. ``mu`` and ``bulk`` [MPa].
 """
 
 from scipy.optimize import brentq
 
 
 def squeezed_volume(mu: float, bulk: float, stretch: float) -> float:
-    """J of a block between frictionless plates at ``stretch`` of its height, free at its sides:
+    """J of a block with free sides between frictionless plates, at the ``stretch`` of its height:
     ``mu/3 J^(-2/3) (J/stretch - stretch^2) + K J (J - 1) = 0``.
     """
 
@@ -44,12 +44,12 @@ def confined_stretch(mu: float, bulk: float, stress: float) -> float:
 
 
 def column_top(mu: float, bulk: float, weight: float, height: float) -> float:
-    """Displacement [mm] of the top of a column in a rigid frictionless box that stands under its own ``weight`` per rest volume
+    """Displacement [mm] of the top of a column that stands in a rigid frictionless box, under its ``weight`` per unit rest volume
     [N/mm3]; ``height`` H [mm] at rest.
 
-    Balance ``P(Z) = -weight (H - Z)``; the displacement, the integral of ``l - 1`` over Z, is by parts
+    Equilibrium requires ``P(Z) = -weight (H - Z)``. The displacement is the integral of ``l - 1`` over Z, by parts
     ``H (l0 - 1) + W(l0) / weight`` with l0 at the bottom and ``W = mu/2 (l^(4/3) + 2 l^(-2/3) - 3) + K/2 (l - 1)^2``.
-    A column that hangs, ``weight`` below zero, has the same form.
+    For a hanging column ``weight`` is negative.
     """
     bottom = confined_stretch(mu, bulk, -weight * height)
     stored = mu / 2 * (bottom ** (4 / 3) + 2 * bottom ** (-2 / 3) - 3) + bulk / 2 * (bottom - 1) ** 2
@@ -57,7 +57,7 @@ def column_top(mu: float, bulk: float, weight: float, height: float) -> float:
 
 
 def pressed_volume(bulk: float, pressure: float) -> float:
-    """V / V0 of a body in a fluid of ``pressure`` P [MPa] on all its faces: ``1 - P / K``, as Cauchy's pressure is ``-U'(J)``; an
-    isochoric law adds nothing. P below K.
+    """V / V0 of a body under a fluid ``pressure`` P [MPa] on all its faces: ``1 - P / K``, as the pressure is ``-U'(J)`` and an
+    isochoric law adds nothing. P must be below K.
     """
     return 1 - pressure / bulk

@@ -1,10 +1,10 @@
-"""A second solver of our own for flat problems: plane strain on a quadrilateral, with finite elements of high order on a graded
-grid, in numpy and scipy alone.
+"""Our second solver for problems in plane strain on a quadrilateral, with finite elements of high order on a graded grid, in numpy
+and scipy alone.
 
-The displacement is a tensor polynomial of degree p on Gauss-Lobatto nodes, continuous; the pressure q a polynomial of total
-degree p - 1, each cell its own. Sought is where ``integral of W(grad u) + q v(grad u) - q^2 / 2K - load . u`` is stationary, W
-the energy at constant volume [MPa] and v the change of volume; Newton on both unknowns together, all that is inside a cell
-eliminated there. Units: mm, N, MPa; loads and forces per mm of thickness.
+The displacement is a continuous tensor polynomial of degree p on Gauss-Lobatto nodes; the pressure q is a polynomial of total
+degree p - 1, discontinuous between cells. ``integral of W(grad u) + q v(grad u) - q^2 / 2K - load . u`` is stationary, with W
+the isochoric energy [MPa] and v the change of volume. Newton's method solves for both unknowns together; the unknowns inside each
+cell are eliminated (static condensation). Units: mm, N, MPa; loads and forces per mm of thickness.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,8 +23,8 @@ Ints = NDArray[np.int64]
 
 
 class Response(NamedTuple):
-    """What a law answers to displacement gradients (..., 2, 2): the slope of W (..., 2, 2) and its tangent (..., 2, 2, 2, 2)
-    [MPa]; v (...), its slope (..., 2, 2) and the constant second derivative of it (2, 2, 2, 2).
+    """The response of a law to displacement gradients (..., 2, 2): the derivative of W (..., 2, 2) and its tangent
+    (..., 2, 2, 2, 2) [MPa]; v (...), its derivative (..., 2, 2) and its constant second derivative (2, 2, 2, 2).
     """
 
     stress: Floats
@@ -39,10 +39,10 @@ Law = Callable[[Floats], Response]
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Cells of a quadrilateral: ``nodes`` (n, 2) [mm] at rest and ``cells`` (m, k) of their indices; at the points of
-    quadrature ``weights`` (m, q) [mm2], ``gradients`` (m, q, k, 2) [1/mm] of the shape functions and ``pressures`` (q, r), the
-    polynomials of the pressure; ``clamped``: the nodes of the first side; ``load`` (n,) [mm]: the integrals of the shape
-    functions over the opposite side.
+    """Cells of a quadrilateral: ``nodes`` (n, 2) [mm] at rest and ``cells`` (m, k), their indices; at the quadrature points
+    ``weights`` (m, q) [mm2], ``gradients`` (m, q, k, 2) [1/mm] of the shape functions and ``pressures`` (q, r), the values of the
+    pressure polynomials; ``clamped``: the nodes of the first side; ``load`` (n,) [mm]: the integrals of the shape functions over
+    the opposite side.
     """
 
     nodes: Floats
@@ -57,7 +57,7 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class Rested:
-    """Where a body comes to rest: ``displacement`` (n, 2) [mm] of the nodes, and ``fixed`` (2,) [N/mm], the force on the clamped
+    """The equilibrium of a body: ``displacement`` (n, 2) [mm] of the nodes, and ``fixed`` (2,) [N/mm], the force on the clamped
     side.
     """
 
@@ -66,12 +66,12 @@ class Rested:
 
 
 def _outer(a: Floats, b: Floats) -> Floats:
-    """``a_ik b_jl`` (..., 2, 2, 2, 2) of (..., 2, 2), with the indices i, k, j, l."""
+    """The product ``a_ik b_jl`` (..., 2, 2, 2, 2) of arrays (..., 2, 2), with the indices i, k, j, l."""
     return np.asarray(np.einsum("...ik,...jl->...ikjl", a, b))
 
 
 def _wide(numbers: Floats, more: int) -> Floats:
-    """``numbers`` (...) with ``more`` axes of length 1 behind."""
+    """``numbers`` (...) with ``more`` trailing axes of length 1."""
     return numbers[(..., *[None] * more)]
 
 
@@ -81,14 +81,14 @@ _TURN = np.einsum("ij,kl->ikjl", [[0.0, 1.0], [-1.0, 0.0]], [[0.0, 1.0], [-1.0, 
 
 
 def _volume(slope: Floats) -> tuple[Floats, Floats, Floats]:
-    """F (..., 2, 2) of a displacement gradient, its determinant J (...) and the cofactors (..., 2, 2)."""
+    """F (..., 2, 2) of a displacement gradient ``slope``, its determinant J (...) and its cofactors (..., 2, 2)."""
     F = _ONE + slope
     area = np.einsum("ikjl,...jl->...ik", _TURN, F)
     return F, np.einsum("...ik,...ik->...", area, F) / 2, area
 
 
 def neo_hooke(shear: float) -> Law:
-    """``W = mu/2 (J^(-2/3) (tr C + 1) - 3)`` and ``v = J - 1``, F and C in the plane, mu = ``shear`` [MPa].
+    """``W = mu/2 (J^(-2/3) (tr C + 1) - 3)`` and ``v = J - 1``, with F and C in the plane and mu = ``shear`` [MPa].
 
     Source: Simo and Taylor, Comput. Methods Appl. Mech. Eng. 85 (1991) 273-310, doi 10.1016/0045-7825(91)90100-K.
     """
@@ -107,8 +107,8 @@ def neo_hooke(shear: float) -> Law:
 
 
 def coupled_neo_hooke(shear: float, lame: float) -> Law:
-    """``W = mu/2 (tr C - 2) + lambda/4 (J^2 - 1) - (lambda/2 + mu) ln J`` with nothing left to the pressure (``v = J - 1``, to be
-    used with a bulk modulus of next to nothing); mu = ``shear``, lambda = ``lame`` [MPa].
+    """``W = mu/2 (tr C - 2) + lambda/4 (J^2 - 1) - (lambda/2 + mu) ln J``, which needs no pressure (``v = J - 1``, to be
+    used with a negligible bulk modulus); mu = ``shear``, lambda = ``lame`` [MPa].
 
     Source: Wriggers, Nonlinear Finite Element Methods, 2008, doi 10.1007/978-3-540-71001-1.
     """
@@ -124,7 +124,7 @@ def coupled_neo_hooke(shear: float, lame: float) -> Law:
 
 
 def small_strain(shear: float) -> Law:
-    """``W = mu e : e``, e the strain less its mean stretch, and ``v = tr(strain)``: Hooke's law, mu = ``shear`` [MPa]."""
+    """``W = mu e : e`` with the deviatoric strain e, and ``v = tr(strain)``: Hooke's law, mu = ``shear`` [MPa]."""
     stiffness = shear * (_SAME + np.einsum("il,kj->ikjl", _ONE, _ONE) - 2 / 3 * _outer(_ONE, _ONE))
 
     def law(slope: Floats) -> Response:
@@ -138,17 +138,17 @@ def small_strain(shear: float) -> Law:
 
 
 def graded(layers: int, ratio: float) -> Floats:
-    """Ticks of [0, 1] whose steps shrink towards 0 geometrically: 0, ratio^layers, ..., ratio, 1."""
+    """Ticks of [0, 1] with intervals that decrease geometrically towards 0: 0, ratio^layers, ..., ratio, 1."""
     return np.append(0.0, ratio ** np.arange(layers, -1, -1.0))
 
 
 def _lobatto(order: int) -> Floats:
-    """The ends and the extrema of the Legendre polynomial of degree ``order`` on [-1, 1], (order + 1,)."""
+    """The ends of [-1, 1] and the extrema of the Legendre polynomial of degree ``order``, (order + 1,)."""
     return np.concatenate([[-1.0], roots_jacobi(order - 1, 1, 1)[0], [1.0]])
 
 
 def _shapes(order: int, at: Floats) -> tuple[Floats, Floats]:
-    """Values and slopes (q, order + 1) at ``at`` (q,) of the polynomials that are 1 at one Gauss-Lobatto node and 0 at the
+    """Values and derivatives (q, order + 1) at ``at`` (q,) of the polynomials that are 1 at one Gauss-Lobatto node and 0 at the
     others.
     """
     coefficients = np.linalg.inv(legendre.legvander(_lobatto(order), order))
@@ -168,7 +168,7 @@ class _Shapes(NamedTuple):
 
 
 def _quadrature(order: int) -> _Shapes:
-    """The cell of degree ``order`` at ``order + 2`` Gauss points along each side."""
+    """The cell of degree ``order`` with ``order + 2`` Gauss points along each side."""
     points, share = legendre.leggauss(order + 2)
     value, slope = _shapes(order, points)
     many = len(points) ** 2
@@ -186,8 +186,8 @@ def _spread(ticks: Floats, local: Floats) -> Floats:
 
 
 def grid(corners: Sequence[tuple[float, float]], across: Floats, along: Floats, order: int) -> Grid:
-    """A grid of cells of degree ``order`` >= 2 on the quadrilateral with ``corners`` [mm], counter-clockwise, clamped between the
-    last and the first: cut at the ticks ``across`` of [0, 1] from there to the opposite side, and at ``along`` these sides.
+    """A grid of cells of degree ``order`` >= 2 on a quadrilateral with ``corners`` [mm], counter-clockwise. The side between the
+    last and the first corner is clamped; ``across``: ticks of [0, 1] from this side to the opposite one, ``along``: along both.
     """
     a, b, c, d = np.array(corners)
     local = _lobatto(order)
@@ -231,7 +231,7 @@ def _system(body: Grid, law: Law, bulk: float, u: Floats, q: Floats) -> tuple[Fl
 
 
 def _split(order: int, pressures: int) -> tuple[Ints, Ints]:
-    """Which unknowns of a cell lie on its rim, and which inside it (all of the pressures)."""
+    """Indices of the unknowns of a cell on its boundary, and of those inside it, among them all pressures."""
     number = np.arange((order + 1) ** 2).reshape(order + 1, order + 1)
     inside = number[1:-1, 1:-1].ravel()
     rim = np.setdiff1d(number, inside)
@@ -265,8 +265,8 @@ def _newton_step(body: Grid, matrix: Floats, residual: Floats, load: Floats) -> 
 
 
 def rest(body: Grid, law: Law, bulk: float, traction: tuple[float, float], steps: int = 1) -> Rested:
-    """Where ``body`` comes to rest under a dead ``traction`` (2,) [MPa] on the side opposite to the clamped one, put on in
-    ``steps``; ``bulk`` is K [MPa]. ArithmeticError where Newton's method does not get there.
+    """The equilibrium of ``body`` under a dead ``traction`` (2,) [MPa] on the side opposite to the clamped side, applied in
+    ``steps``; ``bulk`` is K [MPa]. ArithmeticError if Newton's method does not converge.
     """
     u, q = np.zeros_like(body.nodes), np.zeros((len(body.cells), body.pressures.shape[1]))
     for share in np.arange(1, steps + 1) / steps:
@@ -276,7 +276,7 @@ def rest(body: Grid, law: Law, bulk: float, traction: tuple[float, float], steps
 
 
 def _balance(body: Grid, law: Law, bulk: float, load: Floats, start: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-    """Displacement (n, 2) and pressures (m, r) in balance with ``load`` (n, 2) [N/mm], by Newton from ``start``."""
+    """Displacement (n, 2) and pressures (m, r) in equilibrium with ``load`` (n, 2) [N/mm], by Newton's method from ``start``."""
     u, q = start
     for _ in range(30):
         with np.errstate(invalid="ignore"):

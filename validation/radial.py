@@ -1,10 +1,10 @@
-"""Inflation of a sphere and of a tube, of any law with a finite bulk modulus.
+"""Inflation of a sphere and of a tube, for any law with a finite bulk modulus.
 
-What ``validation/rivlin.py`` has in closed form for incompressible material, without its part of the order of mu / K. The radius
-now is ``r(R)`` of incompressible material plus a polynomial, such that the virtual work, the integral of ``P : dF R^n``, vanishes
-for every polynomial of its degree (Galerkin, Gauss quadrature, root finding). Source: the deformations are those of Ogden 1984,
-ch. 5.2 and 5.3. The error falls exponentially with the degree: below 1e-11 of what is found, for a wall as thick as its
-inner radius.
+Unlike the closed forms of ``validation/rivlin.py`` for incompressible material, these solutions have no error of order mu / K. The
+present radius is ``r(R)`` of incompressible material plus a polynomial, such that the virtual work, the integral of ``P : dF R^n``,
+vanishes for every polynomial of this degree (Galerkin, Gauss quadrature, root finding). Source of the deformations: Ogden 1984,
+ch. 5.2 and 5.3. The relative error decreases exponentially with the degree; it is below 1e-11 for a wall as thick as its inner
+radius.
 """
 
 from collections.abc import Callable
@@ -19,14 +19,14 @@ from validation.laws import Floats, Law
 
 AXIS = np.array([0.0, 0.0, 1.0])
 DEGREE = 10
-# Of r', r and R: F in axes along the radius, around, and along the axis (of the sphere: around too); linear in r' and r.
+# F at r', r and R, in axes along the radius, the circumference and the axis (in a sphere: circumference); linear in r' and r.
 Gradient = Callable[[float, float, float], Floats]
 
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """At radii at rest ``R`` (q,) [mm] with ``weights`` (q,) of their quadrature: where they are in incompressible material,
-    ``start`` (q,) [mm], and its ``steepness`` (q,); polynomials that may be added to it, ``shapes`` (q, k), and their
+    """Radii at rest ``R`` (q,) [mm] with quadrature ``weights`` (q,); radii in incompressible material, ``start`` (q,) [mm], and
+    their derivatives ``steepness`` (q,); polynomials that may be added to ``start``, ``shapes`` (q, k), and their derivatives
     ``slopes`` (q, k).
     """
 
@@ -39,8 +39,8 @@ class Wall:
 
 
 def sphere_pressure(law: Law, bulk: float, radii: tuple[float, float], inner_stretch: float) -> float:
-    """Inside a sphere of inner and outer ``radii`` at rest [mm], of an isotropic ``law``, from the stretch a / A of its inner face;
-    [MPa], as ``bulk``.
+    """The pressure [MPa] in a sphere with inner and outer ``radii`` [mm] at rest and an isotropic ``law``, at the stretch a / A of
+    its inner face; ``bulk`` [MPa].
     """
 
     def gradient(slope: float, r: float, R: float) -> Floats:
@@ -52,8 +52,8 @@ def sphere_pressure(law: Law, bulk: float, radii: tuple[float, float], inner_str
 
 
 def tube(law: Law, bulk: float, radii: tuple[float, float], inner_stretch: float) -> tuple[float, float]:
-    """Pressure [MPa] in a tube that is fixed at its length, and force along the axis in its wall [N], the integral of
-    ``2 pi R P_zz``; arguments as of :func:`sphere_pressure`, a fibre runs along the axis.
+    """The pressure [MPa] in a tube of fixed length, and the axial force [N] in its wall, the integral of ``2 pi R P_zz``. Arguments
+    as for :func:`sphere_pressure`; the fibre direction is the axis.
     """
 
     def gradient(slope: float, r: float, R: float) -> Floats:
@@ -66,7 +66,7 @@ def tube(law: Law, bulk: float, radii: tuple[float, float], inner_stretch: float
 
 
 def _hollow(radii: tuple[float, float], inner_stretch: float, power: int) -> Wall:
-    """A wall whose inner face is fixed: ``start^(n+1) - a^(n+1) = R^(n+1) - A^(n+1)``, shapes that vanish at the inner face."""
+    """A wall with a prescribed inner face: ``start^(n+1) - a^(n+1) = R^(n+1) - A^(n+1)``; the shapes vanish at the inner face."""
     ticks, weights = legendre.leggauss(DEGREE + 8)
     half = (radii[1] - radii[0]) / 2
     R, inner = radii[0] + half * (ticks + 1), inner_stretch * radii[0]
@@ -78,12 +78,12 @@ def _hollow(radii: tuple[float, float], inner_stretch: float, power: int) -> Wal
 
 
 def _slopes(ticks: Floats) -> Floats:
-    """Of the Legendre polynomials up to DEGREE, (q, k)."""
+    """Derivatives of the Legendre polynomials up to DEGREE, (q, k)."""
     return np.asarray(legendre.legval(ticks, legendre.legder(np.eye(DEGREE + 1))).T, dtype=np.float64)
 
 
 def _balanced(law: Law, bulk: float, wall: Wall, gradient: Gradient, power: int) -> tuple[Floats, Floats]:
-    """Where the wall is in balance, r (q,) [mm], and its nominal stress (q, 3, 3) [MPa]."""
+    """The radii r (q,) [mm] at equilibrium, and the nominal stress (q, 3, 3) [MPa]."""
 
     def at(factors: Floats) -> tuple[Floats, Floats]:
         r, slope = wall.start + wall.shapes @ factors, wall.steepness + wall.slopes @ factors
@@ -104,11 +104,11 @@ def _balanced(law: Law, bulk: float, wall: Wall, gradient: Gradient, power: int)
 
 
 def _around(wall: Wall, P: Floats, gradient: Gradient) -> Floats:
-    """``P : dF/dr`` (q,) [N / mm3]."""
+    """The term ``P : dF/dr`` (q,) [N / mm3]."""
     change = np.array([gradient(0.0, 1.0, R) - gradient(0.0, 0.0, R) for R in wall.R])
     return np.asarray(np.einsum("qij,qij->q", P, change))
 
 
 def _work_of_expansion(wall: Wall, P: Floats, gradient: Gradient, power: int) -> float:
-    """The work [MPa mm^n] of moving every radius out by 1, which is that of the pressure on the inner face, ``p a^n``."""
+    """The work [MPa mm^n] if every radius grows by 1, equal to that of the pressure on the inner face, ``p a^n``."""
     return float(np.sum(wall.weights * wall.R**power * _around(wall, P, gradient)))

@@ -1,7 +1,7 @@
 """Closed forms for bodies of incompressible material: torsion of a cylinder, inflation of a sphere, flexure of a block.
 
-Neo-Hooke ``mu/2 (I1 - 3)`` or Mooney-Rivlin ``c1 (I1 - 3) + c2 (I2 - 3)`` with J = 1. A body of bulk modulus K differs from it by
-a part of the order of mu / K. No reading error: closed forms, and root finding to rounding where a docstring says so.
+Neo-Hooke ``mu/2 (I1 - 3)`` or Mooney-Rivlin ``c1 (I1 - 3) + c2 (I2 - 3)`` with J = 1. In a body with bulk modulus K
+results differ by a fraction of order mu / K. No digitisation error: closed forms, and root finding to rounding where stated.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Torsion:
-    """A solid cylinder of ``radius`` A [mm] fixed at its length, each section turned by ``twist`` [rad/mm] times its height:
+    """A solid cylinder of ``radius`` A [mm] and fixed length, each section rotated by ``twist`` [rad/mm] times its height:
     ``r = R, theta = Theta + twist Z, z = Z``; c1, c2 [MPa].
 
     Source: Rivlin 1949, Phil. Trans. R. Soc. A 242, 173, doi 10.1098/rsta.1949.0009; Ogden 1984, ch. 5.3.
@@ -31,7 +31,7 @@ class Torsion:
         return np.pi * (self.c1 + self.c2) * self.twist * self.radius**4
 
     def axial_force(self) -> float:
-        """``-pi/2 (c1 + 2 c2) twist^2 A^4`` [N]: negative, the ends must be pressed together (Poynting effect)."""
+        """``-pi/2 (c1 + 2 c2) twist^2 A^4`` [N]: negative, because the ends must be pressed together (Poynting effect)."""
         return -np.pi / 2 * (self.c1 + 2 * self.c2) * self.twist**2 * self.radius**4
 
     def end_stress(self, radius: float) -> float:
@@ -51,22 +51,22 @@ class Sphere:
     outer: float
 
     def outer_stretch(self, inner_stretch: float) -> float:
-        """Of the outer face, b / B, from the volume of the wall, ``b^3 - a^3 = B^3 - A^3``."""
+        """Stretch b / B of the outer face, from the constant volume of the wall, ``b^3 - a^3 = B^3 - A^3``."""
         return float(np.cbrt(1 + (self.inner / self.outer) ** 3 * (inner_stretch**3 - 1)))
 
     def radius(self, inner_stretch: float, rest: Floats) -> Floats:
-        """Where the points of radius ``rest`` [mm] are, [mm]."""
+        """The present radius [mm] of points with the radius ``rest`` [mm] at rest."""
         return np.cbrt(rest**3 + self.inner**3 * (inner_stretch**3 - 1))
 
     def pressure(self, inner_stretch: float) -> float:
-        """Inside above outside [MPa], from the stretch a / A of the inner face:
+        """Pressure inside minus pressure outside [MPa], at the stretch a / A of the inner face:
         ``mu (2/lb + 1/(2 lb^4) - 2/la - 1/(2 la^4))``, the integral of ``W'(l) / (l^3 - 1)`` from lb to la.
         """
         la, lb = inner_stretch, self.outer_stretch(inner_stretch)
         return self.mu * (2 / lb + 1 / (2 * lb**4) - 2 / la - 1 / (2 * la**4))
 
     def limit_point(self) -> tuple[float, float]:
-        """The inner stretch where the pressure is largest, and that pressure [MPa]; beyond it the shell grows by itself.
+        """The inner stretch at which the pressure is greatest, and this pressure [MPa]; beyond it the pressure falls.
 
         ``dp/dla = 0``: ``(la^-4 + la^-7) = (A/B)^3 (lb^-4 + lb^-7)``, by root finding to 1e-14.
         """
@@ -83,9 +83,9 @@ class Sphere:
 class Flexure:
     """A neo-Hookean block bent into a sector of a tube in plane strain, its curved faces free: ``r^2 = 2 X / c + (r1^2 + r2^2)/2``,
     ``theta = c Y``, X from -h/2 to h/2 through its ``thickness`` h [mm], Y from -L/2 to L/2 along its ``length`` L [mm],
-    ``c = angle / L``; ``angle`` [rad] above zero is between the two ends, ``mu`` [MPa].
+    ``c = angle / L``, with ``angle`` [rad], positive, between the two ends; ``mu`` [MPa].
 
-    ``T_rr = W - W(face)`` with ``W = mu/2 (c^2 r^2 + 1/(c^2 r^2))``: both faces are free where ``c^2 r1 r2 = 1``.
+    ``T_rr = W - W(face)`` with ``W = mu/2 (c^2 r^2 + 1/(c^2 r^2))``: both faces are free if ``c^2 r1 r2 = 1``.
     Source: Rivlin 1949, Proc. R. Soc. A 195, 463, doi 10.1098/rspa.1949.0004; Ogden 1984, ch. 5.3.
     """
 
@@ -100,13 +100,13 @@ class Flexure:
         return self.angle / self.length
 
     def radii(self) -> tuple[float, float]:
-        """Of the two curved faces, r1 < r2 [mm]: ``c^2 r^2 = sqrt(1 + (h c)^2) -+ h c``."""
+        """Radii r1 < r2 [mm] of the two curved faces: ``c^2 r^2 = sqrt(1 + (h c)^2) -+ h c``."""
         c, x = self.curvature, self.thickness * self.curvature
         root = np.hypot(1, x)
         return float(1 / np.sqrt(root + x) / c), float(np.sqrt(root + x) / c)
 
     def moment(self) -> float:
-        """Per width [N]: ``mu / (2 c^2) (h c sqrt(1 + (h c)^2) - arsinh(h c))``, near ``mu h^3 c / 3`` for a thin block.
+        """Moment per width [N]: ``mu / (2 c^2) (h c sqrt(1 + (h c)^2) - arsinh(h c))``, about ``mu h^3 c / 3`` in a thin block.
 
         The forces on an end have no resultant, so the moment is the same about every point.
         """
@@ -124,8 +124,9 @@ class Flexure:
         return self.mu / 2 * (square + 1 / square - face - 1 / face)
 
     def positions(self, points: Floats) -> Floats:
-        """Where rest points (n, 3) [mm] are, (n, 3): bent in the plane of x and y about the z axis through (-rm, 0), with rm
-        the radius of the points of X = 0, which therefore keep the origin and tend to where they rest as the angle falls.
+        """Positions (n, 3) of rest points (n, 3) [mm], bent in the xy plane about the line along z through (-rm, 0), with rm
+        the radius of the points with X = 0. So the origin does not move, and points tend to their rest positions as the angle
+        decreases to 0.
         """
         X, Y, Z = points.T
         c = self.curvature

@@ -1,8 +1,8 @@
-"""A bar of two materials in series that stretches along its axis only: the stiff one has ``ratio`` times the moduli of the soft.
+"""A bar of two materials in series that stretches along its axis only; one has ``ratio`` times the moduli of the other.
 
-The nominal stress P is the same everywhere, and the moduli at x are those of the soft material times ``1 + (ratio - 1) w(x)``, so
-that the stretch there is that of the soft material under P over this factor (``loads.confined_stretch``). P follows from the
-length of the whole. Derived by hand; roots and the integral to rounding. No reading error. ``mu`` and ``bulk`` [MPa].
+The nominal stress P is the same everywhere. The moduli at x are those of the soft material times ``1 + (ratio - 1) w(x)``, so the
+stretch at x is that of the soft material under P divided by this factor (``loads.confined_stretch``). P follows from the length
+of the bar. Derived by hand; roots and the integral to rounding. No digitisation error. ``mu`` and ``bulk`` [MPa].
 """
 
 import numpy as np
@@ -12,8 +12,8 @@ from validation.loads import confined_stress, confined_stretch
 
 
 def stress(mu: float, bulk: float, ratio: float, lengths: tuple[float, float, float], longer: float) -> float:
-    """The nominal stress [MPa] in a bar stretched to ``longer`` [mm]; ``lengths`` [mm]: of the stiff part, of its end in which w
-    falls from 1 to 0 by ``(1000^t - 1) / 999``, and of the bar.
+    """The nominal stress [MPa] in a bar stretched to the length ``longer`` [mm]; ``lengths`` [mm]: of the stiff part, of the
+    transition at its end, where w falls from 1 to 0 as ``(1000^t - 1) / 999``, and of the bar.
     """
     stiff, width, whole = lengths
     nodes, weights = np.polynomial.legendre.leggauss(60)
@@ -28,5 +28,5 @@ def stress(mu: float, bulk: float, ratio: float, lengths: tuple[float, float, fl
 
     most = confined_stress(
         mu, bulk, 1 + (longer / whole - 1) * whole / (whole - stiff)
-    )  # of a stiff part that is rigid
+    )  # the stress if the stiff part were rigid
     return float(brentq(lambda found: length(found) - longer, 0.0, most, xtol=1e-16, rtol=1e-14))

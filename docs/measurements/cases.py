@@ -29,7 +29,7 @@ def _comparison_worst() -> str:
         ("surface_deviation", "rms"): "surface, rms",
         ("fibre_length", "max"): "fibre with the greatest error",
         ("volume", "deviation"): "volume",
-        ("penetration", "deepest"): "deepest in a bone",
+        ("penetration", "deepest"): "greatest penetration",
     }
     rows = []
     for name, cost in measured["cost"].items():

@@ -1,4 +1,4 @@
-"""Learned baselines beside shipped solvers on a data set's frames to test with: ``python baselines.py FOLDER JSON``."""
+"""Learned baselines and shipped solvers on the test frames of a data set: ``python baselines.py FOLDER JSON``."""
 
 import json
 import sys
@@ -12,7 +12,7 @@ import fem_reference as fr
 
 
 def shipped(folder: Path, solver: str) -> Iterator[dict]:
-    """By split the mean distance [mm] of a shipped solver, over the muscles that it solved, and its processor time [s]."""
+    """Mean distance [mm] of a shipped solver from the truth, over the muscles that it solved, and processor time [s], by split."""
     splits = json.loads((folder / "dataset.json").read_text(encoding="utf-8"))["splits"]
     away, seconds = {}, {}
     for name in (name for name in splits["pose"]["train"] if name.startswith("muscle")):

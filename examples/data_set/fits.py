@@ -4,7 +4,7 @@ import numpy as np
 
 
 def network(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """A layer of 32 tanh, trained by Adam with decay of its weights."""
+    """A network with a hidden layer of 32 tanh units, trained by Adam with weight decay."""
     rng, size = np.random.default_rng(1), y.std()
     parts = [rng.normal(size=(x.shape[1], 32)) / x.shape[1] ** 0.5, np.zeros(32), np.zeros((32, y.shape[1]))]
     mean, square = [[np.zeros_like(one) for one in parts] for _ in range(2)]
@@ -21,7 +21,7 @@ def network(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def kernel(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Ridge regression by ``(1 + x.x')^2``, its weight by leaving one out."""
+    """Ridge regression with the kernel ``(1 + x.x')^2``; the penalty is chosen by leave-one-out cross-validation."""
     own, tried = (1 + x @ x.T) ** 2, {}
     for weight in 10.0 ** np.arange(-6, 3):
         inverse = np.linalg.inv(own + weight * np.eye(len(x)))

@@ -1,4 +1,4 @@
-"""Learned baselines on poses and shapes not seen: ``python learn.py FOLDER`` prints mean distances of vertices from the truth."""
+"""Learned baselines on unseen poses and shapes: ``python learn.py FOLDER`` prints mean distances of vertices from the truth."""
 
 import runpy
 import sys
@@ -10,14 +10,14 @@ from fits import kernel, network
 
 
 def blended(one: dict) -> np.ndarray:
-    """Linear blend skinning: each vertex moves with both bones, weighted by its height. What is learned is the rest."""
+    """Linear blend skinning: each vertex moves with both bones, weighted by its height. The fits learn the remainder."""
     at = np.c_[one["points"], np.ones(len(one["points"]))]
     upper, lower = (at @ one["poses"][:, i, :3].transpose(0, 2, 1) for i in (0, 1))
     return lower + at[:, 2:3] / at[:, 2].max() * (upper - lower)
 
 
 def features(one: dict) -> np.ndarray:
-    """Poses of up to three bones and activation by frame; the sizes of the shape at seven heights, its length and bow."""
+    """Poses of up to three bones and activation in each frame; widths of the shape at seven heights, its length and bow."""
     poses = np.pad(one["poses"][:, :, :3] - np.eye(4)[:3], [(0, 0), (0, 3 - one["poses"].shape[1]), (0, 0), (0, 0)])
     fixed = [*np.ptp(one["points"][:420].reshape(21, 20, 3)[::3], axis=1)[:, :2].ravel()]
     fixed += [one["points"][:, 2].max(), one["points"][200:220, 0].mean()]
@@ -25,7 +25,7 @@ def features(one: dict) -> np.ndarray:
 
 
 def learned(fit, seen: list, one: dict, rows: list) -> np.ndarray:
-    """Positions in ``rows`` of a scene, by a ``fit`` of coefficients of the modes of what was seen."""
+    """Positions in the frames ``rows`` of a scene: ``fit`` predicts coefficients of the modes of the ``seen`` displacements."""
     x = np.concatenate([features(other)[r] for other, r in seen])
     y = np.concatenate([(other["positions"] - blended(other))[r].reshape(len(r), -1) for other, r in seen])
     modes = np.linalg.svd(y, full_matrices=False)[2][:20]
@@ -35,13 +35,13 @@ def learned(fit, seen: list, one: dict, rows: list) -> np.ndarray:
 
 
 def of(folder: str, split: str, part: str) -> list:
-    """The muscles drawn at random, read by the loader in the data set."""
+    """The muscles generated at random, read by the loader of the data set."""
     load = runpy.run_path(f"{folder}/load.py")["load"]
     return [pair for pair in load(folder, split, part) if len(pair[0]["points"]) == 422]
 
 
 def errors(folder: str) -> Iterator[dict]:
-    """By split and fit the mean distance [mm] over the muscles to test with, and the processor time [s] of all of them."""
+    """Mean distance [mm] over the test muscles, and their total processor time [s], for each split and fit."""
     for split in ("pose", "shape"):
         train, test = of(folder, split, "train"), of(folder, split, "test")
         for fit in (kernel, network, None):

@@ -1,4 +1,4 @@
-"""An effect outside the package: the three-term law of Yeoh, which stiffens where the matrix is stretched far."""
+"""An effect outside the package: Yeoh's three-term law, which stiffens at large stretches."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from fem_reference.foundations.units import PositivePressure
 
 
 class Yeoh(Energy):
-    """``c1 (I - 3) + c2 (I - 3)^2 + c3 (I - 3)^3`` of ``I = J^(-2/3) tr C`` (Yeoh 1993, doi 10.5254/1.3538343).
+    """``c1 (I - 3) + c2 (I - 3)^2 + c3 (I - 3)^3`` with ``I = J^(-2/3) tr C`` (Yeoh 1993, doi 10.5254/1.3538343).
 
     ``c1``, ``c2``, ``c3``: [MPa]; the shear modulus at rest is ``2 c1``.
     """
@@ -17,6 +17,6 @@ class Yeoh(Energy):
     c3: PositivePressure
 
     def energy(self, state: State) -> Any:
-        """Energy per rest volume [MPa]."""
+        """Energy per unit rest volume [MPa]."""
         over = state.J ** (-2 / 3) * state.I1 - 3
         return self.c1 * over + self.c2 * over**2 + self.c3 * over**3

@@ -1,8 +1,8 @@
-"""A solver of one's own as a command: attached vertices follow their bones, and the others go to the mean of their neighbours.
+"""A solver of your own as a command: attached vertices follow their bones; others take the mean displacement of their neighbours.
 
     python relax.py --iterations 30 SCENE OUT
 
-SCENE is a folder as "fem-reference export" writes it; a mesh of each frame goes into OUT.
+SCENE is a folder written by "fem-reference export"; a mesh for each frame is written into OUT.
 """
 
 import argparse
@@ -15,17 +15,17 @@ import numpy as np
 
 
 def table(path: Path) -> list[list[str]]:
-    """The rows of a CSV file without the names of its columns."""
+    """The rows of a CSV file without its header."""
     return list(csv.reader(path.read_text().splitlines()))[1:]
 
 
 def solve(scene: Path, out: Path, iterations: int) -> None:
-    """Average the displacements of neighbours, beginning with those of the frame before."""
+    """Average the displacements of neighbours, starting from those of the previous frame."""
     rest = meshio.read(scene / "muscle.ply")
     triangles = rest.cells_dict["triangle"]
     edges = np.vstack(
         [triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]
-    )  # of a closed surface, each way once
+    )  # on a closed surface, each edge once in each direction
     neighbours = np.bincount(edges[:, 0])[:, None]
     attached, poses = table(scene / "attachments.csv"), table(scene / "poses.csv")
     vertices = [int(vertex) for _, _, vertex in attached]

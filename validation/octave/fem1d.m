@@ -1,4 +1,4 @@
-% Listing 4.1. Changed: the nodes are passed in (line 5 drew them at random), the solution is returned (lines 26 and 27 drew it).
+% Listing 4.1. Changed: the nodes are passed in (line 5 generated them at random), and the solution is returned (lines 26 and 27 plotted it).
 function sol = fem1d(domain, peclet=1)
     count = numel(domain);
     [dirichlet,neumann] = (@() size([1,2]))();

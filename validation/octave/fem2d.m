@@ -1,5 +1,5 @@
-% Listing 4.5. Changed: the mesh is passed in (lines 2 to 13), line 17 (see README.md), and the vector unknown, of which line 20
-% takes the norm x, is returned with it (lines 22 to 27 drew -x).
+% Listing 4.5. Changed: the mesh is passed in (lines 2 to 13), line 17 (see README.md), and the vector unknown is returned too
+% (line 20 computes its norm x; lines 22 to 27 plotted -x).
 function [x,unknown] = fem2d(tri,points,bnds)
   dim = size(points,2);
   A = first_derivative(tri,points);

@@ -1,4 +1,4 @@
-% Writes the inputs of the witness below the folder `to`, in the files that listing 4.5 loads: tri.csv, points.csv, bounds.csv.
+% Writes the inputs of witness.m below the folder `to`, in the files that listing 4.5 loads: tri.csv, points.csv, bounds.csv.
 function make_inputs(to)
   rand("twister",42);
   mkdir(fullfile(to,"rod"));

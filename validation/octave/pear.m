@@ -1,5 +1,5 @@
-% A closed surface of n vertices for listing 4.5 in three dimensions: the hull of points on a sphere, outward, then stretched,
-% narrowed and bent. Two neighbours at its front are fixed, one at 0 and one at 5 (so that a value other than 0 is witnessed).
+% A closed surface of n vertices for listing 4.5 in three dimensions: the hull of points on a sphere, oriented outwards, then stretched,
+% narrowed and bent. Two neighbouring points at its front are fixed, one at 0 and one at 5 (to test a value other than 0).
 function [tri,points,bnds] = pear(n)
   i = (1:n)';
   z = 1-(2*i-1)/n;

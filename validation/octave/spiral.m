@@ -1,4 +1,4 @@
-% Equation 4.11, which has no listing. The report does not say what its boundary is: here the vertices of the convex hull, at 0.
+% Equation 4.11, which has no listing. The report does not state its boundary: here the vertices of the convex hull, at 0.
 function [tri,points,bnds] = spiral(n)
   i = (1:n)';
   theta = i*(1+sqrt(5))/2;

@@ -1,4 +1,4 @@
-% Listing 4.5, lines 7, 8 and 10 to 12: the plate that it makes when it loads none.
+% Listing 4.5, lines 7, 8 and 10 to 12: the plate that it generates if it loads none.
 function [tri,points,bnds] = square()
   bound = [-1 -1; 1 1];
   count = 20;

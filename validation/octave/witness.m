@@ -1,6 +1,6 @@
-% Runs the listings on the inputs below the folder `from` and writes what they compute below the folder `to`, with 17 digits.
+% Runs the listings on the inputs below the folder `from` and writes their results below the folder `to`, with 17 digits.
 %   rod/solution.csv: a column for each Peclet number.
-%   <plate or surface>/solution.csv: the drawn norm, the vector unknown, and the operator times cos(1), cos(2), ... by vertex.
+%   <plate or surface>/solution.csv: for each vertex the plotted norm, the vector unknown, and the operator times cos(1), cos(2), ...
 function witness(from,to)
   nodes = csvread(fullfile(from,"rod","nodes.csv"));
   peclet = csvread(fullfile(from,"rod","peclet.csv"));
