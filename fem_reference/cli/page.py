@@ -157,7 +157,7 @@ def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Ca
     for text in options.candidate:
         case, equals, folder = text.partition("=")
         if not equals:
-            raise InputError("--candidate", f'"{text}"', "CASE=DIR, a case and a folder of frames of it")
+            raise InputError("--candidate", f'"{text}"', "CASE=DIR, a case and a folder with frames for it")
         if not folder:
             raise InputError("--candidate", '""', "a folder of frames")
         name = casefile.read_muscle(case).name

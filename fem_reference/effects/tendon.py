@@ -12,8 +12,8 @@ class Tendon(Interaction):
     this tendon on the bone.
 
     ``on``: the attachment; ``stiffness`` [N/mm]: the stiffness of all lines together, ``E A / l0`` for a tendon of modulus E and
-    cross-section A; each line has a stiffness k in proportion to area; ``reach`` [mm]. A tendon is slack at rest and excluded with
-    ``in_situ``. Source: Zajac 1989 (Crit. Rev. Biomed. Eng. 17:359), the tendon as a spring in series, here linear.
+    cross-section A; each line has a part k of it, by the area at its start; ``reach`` [mm]. A tendon has no tension at rest, so it
+    is refused with ``in_situ``. Source: Zajac 1989 (Crit. Rev. Biomed. Eng. 17:359), a tendon as a spring in series, here linear.
     """
 
     example: ClassVar[dict[str, Any]] = {"on": "insertion", "stiffness": "20 N/mm", "reach": "15 mm"}

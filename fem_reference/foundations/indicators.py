@@ -44,7 +44,7 @@ class Estimates:
     the attachments, used as stretch of the fibres. ``interval``: the time between frame numbers, None if not stated. ``speed``,
     ``sideways``, ``jump``, ``acceleration``: the maximum speed, sideways speed of the line, sudden change in velocity, and
     acceleration, per frame number. ``frames``: all frame numbers, and knots of ramps. ``tolerance`` [mm], ``stress_tolerance``
-    [MPa]: an effect that changes less is not needed. ``near``: the nearness to each bone.
+    [MPa]: an effect that changes results by less is not needed. ``near``: the nearness to each bone.
     """
 
     length: float
@@ -69,7 +69,7 @@ class Estimates:
     def bend(self, force: float) -> float:
         """Displacement [mm], root mean square, of a Timoshenko beam with clamped ends under a ``force`` per volume [N/mm3]. Its
         length, thickness and shear modulus are those of the muscle; its Young's modulus is three times its shear modulus. The rms
-        is 0.6 of the displacement in the middle, halved because bending also stretches. A free body counts as moved by its length.
+        is 0.6 of the displacement in the middle; a factor of 1/2 is for stretching. For an unattached body it is the length.
         """
         if not self.fixed:
             return self.length
@@ -86,7 +86,7 @@ class Estimates:
         return self.length**2 * force / (8 * 3 * self.shear) * 2 / 3 if self.fixed else self.length
 
     def lag(self, distance: float) -> float:
-        """Lag [mm] of a body that forces would delay by a ``distance`` [mm]; it is less than the travel."""
+        """Lag [mm] of a body, below its travel; ``distance`` [mm] is the estimate without this bound."""
         return distance / (1 + distance / self.travel) if self.travel else 0.0
 
     def greatest(self, effect: Any) -> float:
@@ -94,8 +94,8 @@ class Estimates:
         return max(abs(float(effect.amount(frame))) for frame in self.frames)
 
     def straighten(self, pull: float) -> float:
-        """Displacement [mm] of the surface, root mean square, by the ``pull`` [MPa] of fibres in a beam with clamped ends: at most
-        0.6 of the beam's sag, against its bending stiffness; inclined fibres also shear the beam. A beam with a free end shortens.
+        """Displacement [mm] of the surface, root mean square, as the ``pull`` [MPa] of fibres straightens a beam with clamped ends
+        against its bending stiffness, at most 0.6 of its sag; inclined fibres also shear it. A beam with a free end shortens.
         """
         if self.fixed < 2:
             return self.shorten(pull, 0.3)

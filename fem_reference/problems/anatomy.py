@@ -202,7 +202,7 @@ def _turning(case: MuscleCase) -> Floats:
 
 def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
     """The fibres of a case from their source, perhaps partly outside the ``surface``, and their direction at any point, from the
-    nearest fibre or from a field between attachments. If a source needs tetrahedra, ``fill`` makes them of a size [mm].
+    nearest fibre or from a field between attachments. If a source needs tetrahedra, ``fill`` makes them, given a size [mm].
     """
     if (lines := _given(case)) is not None:
         return lines, NearestLine(lines)
@@ -231,13 +231,13 @@ def _along_field(mesh: TetMesh, asked: Traced, count: int) -> tuple[Polylines, D
 
 
 def field_mesh(surface: Surface, fill: Callable[[float], TetMesh]) -> TetMesh:
-    """The tetrahedra in a closed ``surface`` for fields between attachments, made by ``fill`` of a size [mm]."""
+    """The tetrahedra in a closed ``surface`` for fields between attachments, made by ``fill``, given a size [mm]."""
     return fill(float(np.cbrt(6 * np.sqrt(2) * enclosed_volume(surface.points, surface.triangles) / TETS)))
 
 
 def lean(case: MuscleCase, axis: Floats) -> float:
-    """The lean of given fibres against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, with a the angle between
-    fibre and axis. The lean scales the shear due to the tension of fibres. Traced and mapped fibres follow the axis, except for
+    """The inclination of given fibres to the unit vector ``axis`` (3,): the rms of ``sin 2 a``, with a the angle between
+    fibre and axis. It scales the shear due to the tension of fibres. Traced and mapped fibres follow the axis, except for
     pennation and rotation.
     """
     turning = _turning(case)

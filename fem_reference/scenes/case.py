@@ -62,7 +62,7 @@ class Candidate(SolverChoice):
 class Expectation(Record):
     """A ``truth`` that a measure of this case must meet ``within`` a tolerance.
 
-    ``of``: ``"reference"``, a candidate, or ``"candidates"`` for each that is compared; ``statistic``: optional if the metric has
+    ``of``: ``"reference"``, a candidate, or ``"candidates"`` for all compared ones; ``statistic``: optional if the metric has
     only one; ``frame``: a number or ``"any"``; ``truth`` and ``within``: text with a unit, or numbers if the metric has no unit.
     """
 
@@ -77,7 +77,7 @@ class Expectation(Record):
 
 
 class NegativeControl(Record):
-    """One change of this case with which its verdict must be fail: the ``key`` to change and its new ``value``."""
+    """One change to this case that must turn its verdict into fail: the ``key`` to change and its new ``value``."""
 
     key: str
     value: str | int | float

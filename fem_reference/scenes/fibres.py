@@ -81,7 +81,7 @@ class Fibres(Record):
     ``turned``: a rotation, the same everywhere, from the directions of the lines to the fibre directions of the material; lengths
     are still measured along the lines.
 
-    ``complete``: ends more than 2 mm from an attachment without a ``tendon`` are extended, in the muscle or along its surface, to
+    ``complete``: fibre ends over 2 mm from an attachment without ``tendon`` are extended, in the muscle or along its surface, to
     the nearest point of the attachment.
     """
 

@@ -113,7 +113,7 @@ class Rod(Record):
 class CaseBone(Record):
     """A rigid body: a ``surface`` in a file with coordinates in ``unit``, or exactly one of the closed forms; without ``motion``
     it is fixed. ``distance_error``: the allowed root-mean-square error of the distance, near the surface and before smoothing.
-    ``distance_rounding``: the standard deviation of a Gaussian filter of this distance, as flat triangles prevent smooth sliding.
+    ``distance_rounding``: the standard deviation of a Gaussian filter that smooths it, as edges hinder sliding.
     """
 
     name: Name
@@ -153,7 +153,7 @@ class CaseJoint(Record):
 
 class Muscle(Record):
     """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often each is cut into eight.
-    ``mesher``: ``"quality"`` for well-shaped tetrahedra, or ``"block"`` for a box along the axes: boxes, each cut into six.
+    ``mesher``: ``"quality"`` for well-shaped tetrahedra, or ``"block"`` for a muscle that is an axis-aligned box.
     """
 
     surface: str

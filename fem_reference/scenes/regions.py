@@ -12,14 +12,14 @@ from fem_reference.foundations.units import Length, LengthUnit, PositiveLength
 
 
 class LengthFromAttachment(Record):
-    """The part within a ``length`` of the attached patch of the attachment ``name``."""
+    """The part whose distance from the patch of the attachment ``name`` is at most ``length``."""
 
     name: str
     length: PositiveLength
 
 
 class DepthBelowPatch(Record):
-    """The part within a ``depth`` of the triangles in a file."""
+    """The part whose distance from the triangles in a file is at most ``depth``."""
 
     file: str
     unit: LengthUnit

@@ -72,7 +72,7 @@ def laplacian(cells: VertexCells) -> Any:
 
 
 def least_energy(points: Floats, cells: VertexCells) -> float:
-    """Eq. 5.10 with squares [mm2], at the rotations that fit ``points`` (n, 3) best."""
+    """Eq. 5.10 with squared norms [mm2], at the rotations that fit ``points`` (n, 3) best."""
     return energy(points, fit_rotations(points, cells), cells)
 
 

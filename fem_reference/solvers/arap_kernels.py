@@ -1,4 +1,4 @@
-"""The local step, the right side and the energy of as-rigid-as-possible deformation, compiled. Report eq. 5.10 and 5.11.
+"""The local step, the right-hand side and the energy of as-rigid-as-possible deformation, compiled. Report eq. 5.10 and 5.11.
 
 Arrays are ``points`` (n, 3) [mm] and ``rotations`` (n, 3, 3), writable and C-contiguous.
 """
@@ -29,7 +29,7 @@ class VertexCells(NamedTuple):
 
 @compiled
 def _turn(matrix: Floats, vectors: Floats, p: int, q: int) -> None:
-    """Rotate rows and columns p, q of the symmetric ``matrix`` (4, 4) so that [p, q] is 0, and columns p, q of ``vectors`` too."""
+    """Rotate rows and columns p, q of the symmetric ``matrix`` (4, 4) to make [p, q] 0, and columns p, q of ``vectors`` alike."""
     slope = 0.5 * (matrix[q, q] - matrix[p, p]) / matrix[p, q]
     tangent = math.copysign(1.0, slope) / (abs(slope) + math.sqrt(slope * slope + 1))
     c = 1 / math.sqrt(tangent * tangent + 1)
@@ -91,7 +91,7 @@ def fit_rotations(points: Floats, cells: VertexCells) -> Floats:
     """The rotations (n, 3, 3) of the cells that bring their edges at rest nearest to the edges of ``points``.
 
     The covariance is ``C = sum_j w_ij (p_i - p_j) (p'_i - p'_j)^T``: edges start at the vertex itself, as in Sorkine and
-    Alexa 2007; with the centroids of the report's text the fit would no longer minimise eq. 5.10.
+    Alexa 2007; if they started at the centroid, as in the report's text, the fit would not minimise eq. 5.10.
     """
     rotations = np.empty((len(points), 3, 3))
     covariance, matrix, vectors = np.empty((3, 3)), np.empty((4, 4)), np.empty((4, 4))
@@ -123,7 +123,7 @@ def right_side(rotations: Floats, cells: VertexCells) -> Floats:
 
 @compiled
 def energy(points: Floats, rotations: Floats, cells: VertexCells) -> float:
-    """``sum_i sum_j w_ij |(p'_i - p'_j) - R_i (p_i - p_j)|^2`` [mm2]: eq. 5.10 with the squares as in its source."""
+    """``sum_i sum_j w_ij |(p'_i - p'_j) - R_i (p_i - p_j)|^2`` [mm2]: eq. 5.10 with squared norms, as in Sorkine and Alexa 2007."""
     found = 0.0
     for i in range(len(cells.rest)):
         for at in range(cells.starts[i], cells.starts[i + 1]):

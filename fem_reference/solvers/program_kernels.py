@@ -1,4 +1,4 @@
-"""The report's own program, compiled, with its order of summation. It only opens folds, and its bones are voxels.
+"""The report's own program, compiled, with its order of summation. It opens folds but never closes them, and its bones are voxels.
 
 The code follows the program's source. As the result is chaotic, the last digit matters: each sum has the order that gcc 12 produces
 with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than SSE2), as
@@ -63,7 +63,7 @@ def six_volumes(points: Floats, triangles: Ints) -> tuple[float, Floats]:
 
 @compiled
 def project_volume(points: Floats, triangles: Ints, rest: float) -> None:
-    """Move every point along the gradient of six times the volume, towards its ``rest`` [mm3]; a sixth of the error is removed."""
+    """Move every point along the gradient of six times the volume, towards ``rest`` [mm3]; a sixth of the error is removed."""
     value, gradient = six_volumes(points, triangles)
     weight = 0.0
     for i in range(len(points)):
@@ -103,7 +103,7 @@ def _turn(point: Vector, other: Vector, own: Vector, cosine: float) -> Vector:
 @compiled
 def _gradients(e: Vector, a: Vector, b: Vector) -> tuple[float, Vector, Vector, Vector, Vector]:
     """Cosine of the angle between the normals of triangles (0, e, a) and (0, e, b), and the q of Mueller 2007, appendix A, at 0, e,
-    a and b: the gradients [1/mm] with a minus sign, but a plus sign at e.
+    a and b: at 0, a and b the negative gradient [1/mm], at e the gradient.
 
     For the last component at e the compiler sums the norms of the normals in another order.
     """
@@ -201,7 +201,7 @@ def mark(border: Bools, points: Floats, places: Floats, triangles: Ints) -> None
 
 @compiled
 def flood(border: Bools) -> Bools:
-    """The voxels (k, k, k) reached by a flood from (0, 0, 0) through faces, without the ``border`` or a return to an index of 0."""
+    """The voxels (k, k, k) that a flood from (0, 0, 0) reaches outside the ``border`` through faces, without steps to index 0."""
     outside = np.zeros(border.shape, np.bool_)
     found = np.zeros((border.size, 3), np.int64)
     outside[0, 0, 0] = not border[0, 0, 0]
@@ -232,8 +232,8 @@ def are_inside(inside: Bools, places: Floats) -> Bools:
 @compiled
 def march_out(inside: Bools, goals: Floats, displacements: Floats) -> tuple[Floats, Bools]:
     """The end places (n, 3) of points that are inside at ``goals`` (n, 3), and a mask (n,) of points that went too far; in voxels.
-    Points go straight back along their ``displacements`` (n, 3), in steps of 1, until they are outside; too far means farther than
-    the length of the displacement.
+    Points move along their ``displacements`` (n, 3), which point back to the start, in steps of 1, until they are outside; too far
+    means more than 1 beyond the length of the displacement.
     """
     reached, too_far = goals.copy(), np.empty(len(goals), np.bool_)
     for i in range(len(goals)):

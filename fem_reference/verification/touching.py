@@ -44,7 +44,7 @@ def pressed_blocks(stiffness: float, apart: float = 0.0) -> Body:
 def blocks(lab: Lab, stiffness: float, *, itself: bool = False) -> Finding:
     """The force [N] between the pressed blocks; their faces are two surfaces, or one surface that touches ``itself``."""
     body = pressed_blocks(stiffness, SMOOTHING if itself else 0.0)
-    if itself:  # the blocks are then farther apart than the smoothing, without pressure at rest
+    if itself:  # the gap at rest then equals the smoothing, so there is no pressure at rest
         (law,), facets = body.touching, body.mesh.facets
         mesh = replace(body.mesh, facets=facets | {"faces": np.concatenate([facets[law.one], facets[law.other]])})
         body = replace(body, mesh=mesh, touching=(replace(law, one="faces", other="faces"),))

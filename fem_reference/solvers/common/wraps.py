@@ -84,7 +84,7 @@ class Wraps:
     bones: tuple[Bone, ...]
 
     def around(self, fixed: Floats, number: int) -> Paths | Winding:
-        """The shortest paths of all parts of lines through the points ``fixed`` (k, q + 1, 3), line by line, at a frame."""
+        """The shortest path between each two successive points ``fixed`` (k, q + 1, 3), ordered by line, at a frame."""
         starts, ends = fixed[:, :-1].reshape(-1, 3), fixed[:, 1:].reshape(-1, 3)
         if not self.given:
             return wrapping.straight(starts, ends)

@@ -90,7 +90,7 @@ class PointSprings:
         self.ends = self.wanted = self.points.rest - self.along * (self.points.positions(response) - self.points.rest)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
-        """Add spring forces to ``residual`` over this rank's unknowns, advanced to first order by ``moves`` (n,) if given."""
+        """Add spring forces to ``residual`` over this rank's unknowns, at the unknowns plus ``moves`` (n,) if given."""
         now = self.unknowns.x.array
         self.points.add_forces(residual, self._pulls(now if moves is None else now + moves))
 
