@@ -52,7 +52,8 @@ class CellSums:
         unknowns, element = form.unknowns, form.element
         space, msh = unknowns.function_space, unknowns.function_space.mesh
         self.form, self.mesh, self.function = form, msh, unknowns
-        self.count, self.size = msh.topology.index_map(3).size_local, len(unknowns.x.array)
+        self.count = msh.topology.index_map(3).size_local
+        self.size = len(unknowns.x.array)
         parts = [space.sub(0).sub(component) for component in range(3)]
         parts += [space.sub(1)] if space.num_sub_spaces > 1 else []
         self.unknowns: Places = np.concatenate([part.dofmap.list for part in parts], axis=1)[: self.count]

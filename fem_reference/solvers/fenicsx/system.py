@@ -64,7 +64,8 @@ class System:
         self.structure = structure
         self.tangent = Tangent(np.zeros(len(rows) + 1), self.cells.places(structure, self.fixed), unit)
         self.matrix.setPreallocationCOO(names[rows], names[structure.columns])
-        diagonal, own = np.flatnonzero(structure.columns == rows), np.flatnonzero(self.fixed[: self.owned])
+        diagonal = np.flatnonzero(structure.columns == rows)
+        own = np.flatnonzero(self.fixed[: self.owned])
         self.prescribed_diagonal = diagonal[own]  # every row has one, in the order of the rows
         for terms in self.surface:
             terms.find_places(self._keys())
@@ -144,7 +145,8 @@ class System:
         pressures[np.unique(space.sub(1).dofmap.list[: self.cells.count])] = True
         rows = np.repeat(np.arange(self.size), np.diff(self.structure.starts))
         squares = self.tangent.entries[:-1] ** 2
-        moved, of_pressures = ~pressures[rows] & ~self.fixed[rows], pressures[self.structure.columns]
+        moved = ~pressures[rows] & ~self.fixed[rows]
+        of_pressures = pressures[self.structure.columns]
         sums = [float(squares[moved & (of_pressures == which)].sum()) for which in (False, True)]
         stiff, coupling = self.unknowns.function_space.mesh.comm.allreduce(np.array(sums), MPI.SUM)
         if coupling > 0:
@@ -183,7 +185,8 @@ class SurfaceSums:
     def __init__(self, terms: Any, unknowns: fem.Function, fixed: NDArray[np.bool_]) -> None:
         step = ufl.TrialFunction(unknowns.function_space)
         self.residual, self.slope = compiling.form(terms), compiling.form(ufl.derivative(terms, unknowns, step))
-        self.matrix, self.fixed = fem.create_matrix(self.slope), fixed
+        self.matrix = fem.create_matrix(self.slope)
+        self.fixed = fixed
 
     def find_places(self, keys: Ints) -> None:
         """Find the places of the tangent among entries with the sorted ``keys`` (e,), each ``row * size + column``."""
