@@ -130,12 +130,19 @@ def without_curves(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def without_pictures(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
-    """Pages are written as where nothing can draw, and without curves."""
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages are written as where nothing can draw."""
+    from undrawn import undraw
+
     from fem_reference.report import gallery
 
-    request.getfixturevalue("without_curves")
-    monkeypatch.setattr(gallery, "program", lambda _job, _folder: ["/nowhere/python"])
+    monkeypatch.setattr(gallery, "program", gallery.program)  # restored after the test
+    undraw()
+
+
+@pytest.fixture
+def without_pictures(undrawn: None, without_curves: None) -> None:
+    """Pages are written as where nothing can draw, and without curves."""
 
 
 @pytest.fixture(scope="session")

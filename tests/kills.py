@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import small
+from undrawn import UNDRAWN
 
 from fem_reference.foundations.subprocesses import command, environment
 from fem_reference.runs import store
@@ -31,12 +32,7 @@ COMMANDS = {
     "study": ["study", "--solver", "arap"],
 }
 # What a command does that draws no pictures.
-UNDRAWN = """
-from fem_reference.cli import entry
-from fem_reference.report import gallery
-gallery.program = lambda _job, _folder: ["/nowhere/python"]
-entry()
-"""
+_COMMAND = f"{UNDRAWN}from fem_reference.cli import entry\nentry()\n"
 # What is no answer: it takes another time each time.
 _TIMES = ("seconds", "cost", "machine", "peak_memory", "processor", "finished", "time", "folder", "unknowns_per")
 
@@ -121,7 +117,7 @@ class Subject:
         verb, *rest = self.words
         words = [verb, str(self.scene), *rest, "--out", str(self.out), "--set", f"frames.every={self.every}"]
         return subprocess.Popen(
-            command(*(("-m", "fem_reference") if self.drawn else ("-c", UNDRAWN)), *words),
+            command(*(("-m", "fem_reference") if self.drawn else ("-c", _COMMAND)), *words),
             env=environment(OMP_NUM_THREADS="1", TMPDIR=str(self.scratch)),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,

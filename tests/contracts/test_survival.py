@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import shapes
 import small
+from undrawn import UNDRAWN
 
 from fem_reference import cli, report
 from fem_reference.assessment.stress import Stress
@@ -109,10 +110,9 @@ def test_a_command_that_is_killed_ends_as_if_it_had_not_been(tmp_path: Path) -> 
 
 
 # What a process does that may write no file beyond so many bytes: as on a disk that is full.
-_SMALL_DISK = """
+_SMALL_DISK = f"""
+{UNDRAWN}
 import resource, sys
-from fem_reference.report import gallery
-gallery.program = lambda _job, _folder: ["/nowhere/python"]
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)
 from fem_reference.cli import main
 sys.exit(main(sys.argv[2:]))
