@@ -19,7 +19,7 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.checks import SAME
 from fem_reference.problems.loads import external_load
 from fem_reference.problems.muscle import MuscleProblem
-from fem_reference.problems.overlaps import longest_edge, overlap_at, through_itself
+from fem_reference.problems.overlaps import BETWEEN, longest_edge, overlap_at, through_itself, unseen
 from fem_reference.problems.setup import AttachedVertices, Bone
 from fem_reference.runs.contents import scalar_vectors, vector_names
 from fem_reference.runs.store import Run
@@ -32,8 +32,9 @@ _STRAIN = 3.0
 _SPRINGS = 1.5
 # The maximum rotation of a bone per load step, on average between two frames: beyond it the sense of rotation is unknown.
 _TURN = 1.01 * math.pi / 2
-# Between contact points, half a spacing apart, a right-angled edge can penetrate by a quarter of the spacing, a crease by less.
-_BETWEEN, _CREASE = 0.25, 0.1
+_CREASE = (
+    0.1  # between contact points, a crease can penetrate by less of the spacing than a right-angled edge, ``BETWEEN``
+)
 # Self-contact of a part allows a penetration of less than this fraction of the spacing, for any recorded pressure.
 _OWN = 0.5
 # A bone that penetrates by more than this fraction of half its thickness has broken through contact, whatever the stiffness.
@@ -100,13 +101,13 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
     """Overlap of parts that may touch; allowed are smoothing, compliance, gaps between points, and overlap remaining from rest."""
     for law in body.touching:
-        apart, depth = longest_edge(body.mesh, law) / 4, partial(overlap_at, body.mesh, law)
+        edge, depth = longest_edge(body.mesh, law), partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
         for state in solved.states:
             pressure = state.scalars.get(law.pressure_name, state.scalars.get("touching_pressure", 0.0))
-            most = _OWN * 2 * apart if law.one == law.other else np.inf
+            most = _OWN / 2 * edge if law.one == law.other else np.inf
             give = np.min([pressure / law.stiffness, state.scalars.get("touching_depth", np.inf), most])
-            given = law.smoothing + float(give) + _BETWEEN * apart + law.allowance(state.number) * at_rest
+            given = law.smoothing + float(give) + unseen(body.mesh, law) + law.allowance(state.number) * at_rest
             yield RunCheck(f"{law.one} in {law.other}", depth(state.points), given, "mm", state.number)
 
 
@@ -284,7 +285,7 @@ def give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> f
     """The allowed penetration [mm] under a ``pressure`` [MPa], for contact points half of ``apart`` [mm] apart."""
     assert problem.contact is not None  # called only with contact
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
-    return pressure / problem.contact.stiffness + known + _BETWEEN * apart
+    return pressure / problem.contact.stiffness + known + BETWEEN * apart
 
 
 def _creases(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:

@@ -11,20 +11,22 @@ from fem_reference.geometry.skins import edge_lengths
 from fem_reference.problems.body import Body, Cells, facet_corners, outer_facets, reference_nodes
 from fem_reference.problems.touching import Touching
 
+# Between contact points, half a spacing apart, a right-angled edge can penetrate by a quarter of the spacing.
+BETWEEN = 0.25
 _SPLIT = np.array([[0, 1, 2], [2, 1, 3]])  # cuts a facet with four corners into two triangles
 
 
 def overlap(body: Body, law: Touching) -> float:
-    """A lower bound on the depth [mm] to which the parts of a ``law`` overlap at the start."""
+    """The depth [mm] to which the parts of a ``law`` overlap at the start, as in ``overlap_at``."""
     points = body.mesh.points if body.start is None else body.start(np.array(body.mesh.points))
     return overlap_at(body.mesh, law, points)
 
 
 def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
-    """A lower bound on the depth [mm] to which the parts of a ``law`` overlap with the mesh at ``points`` (n, 3) [mm]: the greatest
-    depth of a corner of either part below the skin of the piece of the other part, or of facets that cross. For a part with itself
-    it is the greatest depth of the middle of a facet within the entire skin, or of facets that cross the skin. Curved facets are
-    measured at their corners, minus their bulge.
+    """The depth [mm] to which the parts of a ``law`` overlap with the mesh at ``points`` (n, 3) [mm]. The greater of two depths: of
+    a corner of either part below the skin of the piece of the other part (a lower bound), and of facets that cross (too large where
+    ridges cross). For a part with itself it is the greatest depth of the middle of a facet within the entire skin, or of facets
+    that cross the skin. Curved facets are measured at their corners, minus their bulge.
     """
     one, other = mesh.facets[law.one], mesh.facets[law.other]
     owner, facets, triangles = _skin(mesh, points)
@@ -70,6 +72,11 @@ def longest_edge(mesh: Cells, law: Touching) -> float:
     """The longest edge [mm] at rest of facets of a ``law``: contact points are at most a quarter of this length apart."""
     corners = (mesh.points[mesh.facets[name]] for name in (law.one, law.other))
     return max(float(edge_lengths(one).max()) for one in corners)
+
+
+def unseen(mesh: Cells, law: Touching) -> float:
+    """The depth [mm] to which a right-angled edge can penetrate between contact points."""
+    return BETWEEN * longest_edge(mesh, law) / 4
 
 
 def beyond_rim(body: Body, side: str, other: str) -> Ints:

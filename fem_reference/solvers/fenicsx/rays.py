@@ -22,6 +22,8 @@ _WIDE = 0.1
 _SHALLOW, _NEAR = 0.25, 0.4
 _STAYS = 4.0  # beyond edges, the facet of the last search is taken unless another has this times its pressure
 _ON = 1e-7  # a place is on a facet up to this distance beyond its edges, in reference coordinates
+_BENT = 3.0  # the height up to which a facet can face a point inside, in bulges of the facet; 2.1 if it is bent by 45 degrees
+_SAME = 1e-6  # crossings of a line are the same up to this distance [mm]
 _AT = 0.02  # the same for the place nearest to a point
 # A point is in contact with this share of its pressure, or up to this times the depth under its pressure beyond the smoothing.
 _HALF, _YIELDS = 0.5, 2.0
@@ -137,6 +139,7 @@ class RayPass(Pass):
             full[stays] *= _STAYS
         out, full = out[full > 0], full[full > 0]
         found = np.sort(np.concatenate([hits, out[_first(some[out], -full)]]))
+        found = np.delete(found, self._hidden(nodes, here[found], gap[found]))
         of = np.flatnonzero((shade[found] >= 0) & (left[found] > 0) & (beyond[found] > _ON))
         by = shade[found[of]]
         shades = Shades(of, facets[by], there[by], gap[by], _NEAR * size[found[of]])
@@ -144,16 +147,32 @@ class RayPass(Pass):
         left[hits] = 1.0
         return Hits(points, own, here[found], facets[found], there[found], gap[found], left[found], shades)
 
+    def _hidden(self, nodes: Floats, here: FacetPlaces, gap: Floats) -> Ints:
+        """The hits (k,) that lie behind a nearer crossing of a facet that is out of reach, which ``_lines`` leaves out."""
+        reach = self._reach(nodes)
+        deep = np.flatnonzero(-gap > reach.min())
+        if not len(deep):
+            return deep
+        half, (middles, radii) = gap[deep, None] / 2, self.other.balls(nodes)
+        one, facets = pairs(here.point[deep] + half * here.normal[deep], middles, radii + np.abs(half).max())
+        some = deep[one]
+        there, nearer = self.other.along(nodes, facets, here.point[some], here.normal[some])
+        between = (nearer < -reach[facets]) & (nearer > gap[some] + _SAME) & (self.other.beyond(there.at) <= _ON)
+        return np.unique(some[between])
+
     def _lines(self, unknowns: Floats, nodes: Floats, most: float) -> tuple[Ints, Ints, FacetPlaces]:
         """Pairs of points and facets (p,) that lines along normals may hit, and the points' places on their own facets."""
         points, (middles, radii) = self.places(unknowns), self.other.balls(nodes)
-        some, facets = self._near(points, (middles, radii), radii + np.maximum(radii, most), 0 * points[:, 0], nodes)
+        reach = np.maximum(self._reach(nodes), most)
+        some, facets = self._near(points, (middles, radii), radii + reach, 0 * points[:, 0], nodes)
         height, bulge = self._heights(nodes, points, some, facets)
-        kept = np.abs(height) < (np.maximum(self._reach(nodes), most) + bulge)[facets]
-        some, facets = some[kept], facets[kept]
+        kept = np.flatnonzero(np.abs(height) < (reach + bulge)[facets])
+        some, facets, height = some[kept], facets[kept], height[kept]
         here = self._here(self.side.nodes(unknowns), some)
         away = middles[facets] - here.point
         kept = np.vecdot(away, away) - np.vecdot(away, here.normal) ** 2 <= radii[facets] ** 2
+        # Only points that can have contact. A bent facet may face a point that is above its middle plane, by more than its bulge.
+        kept &= np.isin(some, some[kept & (height < most + _BENT * bulge[facets])])
         return some[kept], facets[kept], here[np.flatnonzero(kept)]
 
     def _ends(self, at: Floats, gap: Floats, facets: Ints) -> tuple[Floats, Floats, Floats]:

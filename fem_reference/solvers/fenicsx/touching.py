@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 
 from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.problems.body import Body
-from fem_reference.problems.overlaps import beyond_rim, overlap
+from fem_reference.problems.overlaps import beyond_rim, overlap, unseen
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.facets import facets_of
 from fem_reference.solvers.fenicsx.forms import Form
@@ -32,7 +32,7 @@ class TouchingForces:
     """Contact between the parts of the surface named by ``touching``, on one rank; updated when the unknowns have changed."""
 
     def __init__(self, body: Body, form: Form, displacement: Displacement, spent: Spent) -> None:
-        """ArithmeticError where parts overlap at rest by more than the smoothing."""
+        """ArithmeticError if parts overlap at rest by more than the smoothing plus the overlap that is removed."""
         self.unknowns, self.spent = displacement.unknowns, spent
         self.passes, self.rims = self._passes(body, form, displacement)
         self.now = list[tuple[Met, PressedPoints]]()
@@ -45,8 +45,9 @@ class TouchingForces:
         depths = [(one.law, one.depth(met)) for one, (met, _) in zip(self.passes, self.now, strict=True)]
         for law in body.touching:
             seen = max(depth for one, depth in depths if one is law)
-            deep, most = max(seen, overlap(body, law)), law.smoothing + (max(seen, 0.0) if law.relaxed else 0.0)
-            if deep > most:  # contact would neither see nor remove it
+            left = max(seen, 0.0) + unseen(body.mesh, law) if law.relaxed else 0.0
+            deep, most = max(seen, overlap(body, law)), law.smoothing + left
+            if deep > most:  # more than contact sees, removes or may leave between points
                 raise ArithmeticError(
                     f'"{law.one}" and "{law.other}" overlap by {deep:.3g} mm; at most {most:.3g} mm is allowed'
                 )

@@ -25,6 +25,7 @@ _DEEP = 0.125
 # The cosine between a normal and the opposite one up to which a point does not face a place, and contact has no pressure.
 GRAZING = 0.3
 _AT_ONCE = 100000  # pairs whose paths are followed together
+_SWING = 5 / 3  # a place on a facet moves at most this times as far as its nodes (Lebesgue constant of P2)
 _BULGE = 1.25  # a facet bulges from a plane at most this times as far as its farthest node
 
 
@@ -245,12 +246,15 @@ class Pass:
     def _passed_by(self, before: Floats, last: Met, now: Floats, seen: Ints, deep: Floats) -> Ints:
         """The points as in ``through``, without those ``seen``, or up to ``deep`` (n,) [mm] behind a facet they do not face."""
         starts, ends = self.places(before), self.places(now)
-        free = np.ones(len(ends), bool)
-        free[seen], none = False, np.zeros(0, np.int64)
         old, new = self.other.nodes(before), self.other.nodes(now)
-        near = Pass.met(self, before, float(self.other.balls(old)[1].max()), None, (before, last))
-        near = near.some(np.flatnonzero(free[near.points]))
+        shift = (new - old).mean(axis=(0, 1))  # a common displacement changes nothing
+        ends, new = ends - shift, new - shift
+        free, none = ~np.isin(np.arange(len(ends)), seen), np.zeros(0, np.int64)
         rise, reach, clear = np.zeros_like(starts), self._reach(old), self._heights(old, starts, none, none)[1]
+        travel = sum(float(np.linalg.norm(way, axis=-1).max()) for way in (ends - starts, _SWING * (new - old)))
+        most = min(max(self.law.smoothing, float(clear.max()), travel), float(self.other.balls(old)[1].max()))
+        near = Pass.met(self, before, most, None, (before, last))
+        near = near.some(np.flatnonzero(free[near.points]))
         for one in (near, last):
             high = np.maximum(self.law.smoothing, clear[one.facets]) - one.gap
             rise[one.points] = np.clip(high, 0, reach[one.facets])[:, None] * one.there.normal
@@ -281,8 +285,6 @@ class Pass:
 
     def _passed(self, starts: Floats, ends: Floats, free: NDArray[np.bool_], old: Floats, new: Floats) -> Ints:
         """The ``free`` points (n,) that pass flat pieces of facets on their path, and these facets: (2, p)."""
-        shift = (new - old).mean(axis=(0, 1))  # a common displacement changes nothing
-        ends, new = ends - shift, new - shift
         (first, wide), (last, later) = self.other.balls(old), self.other.balls(new)
         far = np.linalg.norm(ends - starts, axis=1) / 2
         radii = np.maximum(wide, later) + np.linalg.norm(last - first, axis=1) / 2

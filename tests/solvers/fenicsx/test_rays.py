@@ -1,5 +1,7 @@
 """Contact along own normals: forces balance, are continuous across creases and sharp edges, and have an exact tangent."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -130,6 +132,25 @@ def test_the_first_crossing_decides() -> None:
     )
     unknowns[upper] = [-0.2, 0.0, -1.1]
     assert not len(hits(contact).points)
+
+
+def test_a_line_ends_at_a_sheet_that_is_out_of_reach() -> None:
+    """Points of a plate are 0.3 below a top; what is deeper than a facet is wide, 0.7, would be out of reach. A sheet 0.1 thick
+    comes between, 0.1 above the points: its bottom, which faces away from them, reaches to 0.05 only.
+    """
+    boxes = {"low": ((1.0, 1.0, 0.02), 1.0), "sheet": ((1.0, 1.0, 0.1), 3.0), "high": ((0.04, 0.04, 0.001), 2.0)}
+    cells = {name: shapes.box((1, 1, 1), size, "tetrahedron") for name, (size, _) in boxes.items()}
+    for name, (_, height) in boxes.items():
+        cells[name].points[:] += [0.48 * (name == "high"), 0.3 * (name == "high"), height]
+    mesh = shapes.joined(cells)
+    both = np.concatenate([mesh.facets[name] for name in ("low_z1", "sheet_z0", "sheet_z1")])
+    mesh = replace(mesh, facets={"other": both, "points": mesh.facets["high_z0"]})
+    contact, displacement = contact_of(mesh, Touching("points", "other", K, 0.02, own_normals=True), "P2/P1")
+    rest, unknowns = displacement.space.tabulate_dof_coordinates()[:, 2], contact.unknowns.x.array
+    unknowns[displacement.dofs[(rest > 1.9) & (rest < 2.1), 2]] = 0.72 - 2
+    assert len(hits(contact, 0).points) == len(contact.passes[0].areas)
+    unknowns[displacement.dofs[rest > 2.9, 2]] = 0.82 - 3
+    assert not len(hits(contact, 0).points)
 
 
 @pytest.mark.parametrize("element", KINDS)

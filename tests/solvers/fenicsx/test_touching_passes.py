@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Cells
+from fem_reference.problems.overlaps import unseen
 from fem_reference.problems.touching import Touching
 from fem_reference.solvers.fenicsx import meshes
 from fem_reference.solvers.fenicsx.spent import Spent
@@ -287,3 +288,18 @@ def test_a_point_outside_beside_the_edge_of_a_wall_is_not_deep_in_the_wall() -> 
     mesh = replace(mesh, facets=facets)
     contact, _ = contact_of(mesh, Touching("low", "high", K, D), "P2/P1")
     assert [len(met.points) for met, _ in contact.now] == [0, 0]
+
+
+def test_ridges_that_cross_between_points_are_refused_at_rest_unless_their_overlap_is_removed() -> None:
+    """Roofs whose ridges cross, 0.02 deep, with slopes of 0.1. A facet reaches beyond the plane of another by (0.05 + 0.02) over
+    sqrt(1.01). Between the points a right-angled edge could reach 1/16 of the longest edge, sqrt(1 + 0.5**2 + 0.05**2).
+    """
+    low, high = (shapes.box(counts, (1.0, 1.0, 1.0), "tetrahedron") for counts in ((2, 1, 1), (1, 2, 1)))
+    low.points[:, 2] -= 0.1 * low.points[:, 2] * np.abs(low.points[:, 0] - 0.5)
+    high.points[:, 2] += 0.98 + 0.1 * (1 - high.points[:, 2]) * np.abs(high.points[:, 1] - 0.5)
+    mesh, law = shapes.joined({"low": low, "high": high}), Touching("low_z1", "high_z0", K, 0.02)
+    with pytest.raises(ArithmeticError, match=f"overlap by {0.07 / np.sqrt(1.01):.3g} mm; at most 0.02 mm is allowed"):
+        contact_of(mesh, law, "P2/P1")
+    contact, _ = contact_of(mesh, replace(law, relaxed=(0.0, 1.0)), "P2/P1")
+    assert 0 < contact.overlap <= 0.02
+    assert unseen(mesh, law) == pytest.approx(np.sqrt(1 + 0.5**2 + 0.05**2) / 16)
