@@ -12,7 +12,9 @@ Progress = Callable[[str], object]
 
 @contextmanager
 def reported(progress: Progress | None) -> Iterator[None]:
-    """A context in which each line of progress goes to ``progress``; InputError unless it is callable or None."""
+    """A context in which each line of progress goes to ``progress``, one at a time, from any thread; InputError unless it is
+    callable or None.
+    """
     if progress is None:
         yield
         return

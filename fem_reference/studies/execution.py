@@ -12,6 +12,7 @@ from fem_reference import solvers
 from fem_reference.assessment import second_check
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join
+from fem_reference.foundations.threads import made_once
 from fem_reference.foundations.version import __version__
 from fem_reference.problems import of_case
 from fem_reference.problems.estimates import Decision
@@ -42,14 +43,14 @@ class Bench[C: Case]:
     """A case with its set-up and its problem, each made once, when first needed, and the store of its runs."""
 
     def __init__(self, scene: C, store: Path, ranks: int | None = None, time_limit: float = math.inf) -> None:
-        self._setup: Callable[[], CaseSetup] = cache(lambda: of_case.setup(scene))
+        self._setup: Callable[[], CaseSetup] = made_once(lambda: of_case.setup(scene))
         self._scene, self.store, self.ranks = of_case.chosen(scene, self._setup), store, ranks
         self.time_limit = time_limit  # the processor time [s] that a candidate may take
         self._begin()
 
     def _begin(self) -> None:
         """Reset everything that depends on the effects that act, so that it is made again when needed."""
-        self._problem: Callable[[], CaseProblem] = cache(lambda: of_case.problem(self.scene, self._setup()))
+        self._problem: Callable[[], CaseProblem] = made_once(lambda: of_case.problem(self.scene, self._setup()))
         # The watch for effects that the case left out but that turn out to matter; None if it left out none.
         self.watch: Callable[[], Watch | None] = cache(lambda: of_case.watch(self.scene, self._setup(), self._problem))
 
@@ -118,7 +119,8 @@ class Bench[C: Case]:
 
     def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
         """Raise InputError if settings do not suit the case: those of the reference, of a candidate of the case (except recorded
-        frames, which may come later) or of the ``chosen`` solvers. The problem of the case is checked only if it has to be solved.
+        frames, which may come later) or of the ``chosen`` solvers. The problem of the case, and before it the frames of chosen
+        candidates, are checked only if something has to be solved.
         """
         if self.scene.parts:
             self.settings(self.scene.reference, "reference")
@@ -131,6 +133,9 @@ class Bench[C: Case]:
         solved = [(one, place) for one, place in wanted if one.solver != "recorded"]
         if all(store.finished(self.folder(*one), self._ended(one[0].solver)) for one in solved):
             return
+        for one, place in wanted:
+            if one.solver == "recorded":
+                self.read(place, one, place)
         for one, place, own in settings:
             offer = solvers.find(one.solver, place, self.scene.task)
             if offer.check_problem:

@@ -15,32 +15,22 @@ from fem_reference.runs.contents import vector_scalars
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.scenes.muscles import MusclesCase, muscles_of, with_muscles
-from fem_reference.solvers import fenicsx
+from fem_reference.scenes.muscles import MusclesCase
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.variations import by_springs, on_larger
+from fem_reference.studies.variations import by_springs
 
 log = logging.getLogger(__name__)
-
-
-def coarser(case: MusclesCase) -> tuple[MusclesCase, float]:
-    """The case with larger tetrahedra in every muscle, and the ratio of the sizes: the same for all, as errors of one muscle
-    reach its neighbours. If all muscles are refined, the last refinement is left out.
-    """
-    if all(one.refinements for one in muscles_of(case)):
-        return with_muscles(case, lambda one: {"refinements": one.refinements - 1}), 2.0
-    return on_larger(case, refinement.RATIO), refinement.RATIO
 
 
 def check(bench: Bench[Case]) -> None:
     """Raise InputError if a case that has to be solved cannot have error bars, because larger tetrahedra cannot be set up."""
     if store.finished(bench.folder(bench.scene.reference, "reference")):
         return  # nothing that takes long comes before its bars
-    with refinement.reported(refinement.LARGER):
-        several = cast("MusclesCase", bench.scene)
-        larger = coarser(several) if several.parts else refinement.coarser(bench.of_muscle().scene)
-        Bench(cast("Case", larger[0]), bench.store, bench.ranks).problem()
+    if bench.scene.parts:
+        refinement.coarser(cast("Bench[MusclesCase]", bench))
+    else:
+        refinement.coarser(bench.of_muscle())
 
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> dict[str, ErrorBars]:
@@ -51,12 +41,10 @@ def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> dict[st
         log.info("no error bars: the reference did not converge")
         return {}
     own, parts = cast("Bench[MusclesCase]", bench), bench.parts
-    base, ratio = coarser(own.scene)
+    base, ratio = refinement.coarser(own)
     springs = {name: by_springs(part.scene) for name, part in parts.items()}
-    with fenicsx.shared():
-        found = refinement.solutions(
-            own, reference, {refinement.LARGER: base}, ratio, model=model and any(springs.values())
-        )
+    larger = {refinement.LARGER: base}
+    found = refinement.solutions(own, reference, larger, ratio, model=model and any(springs.values()))
     split = {name: other.by_muscle(run) for name, (other, run) in found.items()}
     fine, coarse, exact = own.by_muscle(reference), split.pop(refinement.LARGER), split.pop(refinement.EXACT, {})
     bars = dict[str, ErrorBars]()

@@ -3,8 +3,9 @@
 import hashlib
 import logging
 import math
+import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -13,29 +14,28 @@ import numpy as np
 
 from fem_reference import metrics, solvers
 from fem_reference.assessment import differences, error_bars, force_bars, neighbours, run_checks, second_check
-from fem_reference.assessment.error_bars import SAFETY, BodyBars, ErrorBars, Pair
+from fem_reference.assessment.error_bars import SAFETY, ErrorBars, Pair
 from fem_reference.effects import touching
 from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Ints
 from fem_reference.foundations.records import Record
+from fem_reference.foundations.threads import in_threads
 from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.io import files
 from fem_reference.metrics import context_of
-from fem_reference.problems.body import Body
-from fem_reference.problems.finer import finer as on_finer_cells
-from fem_reference.runs import views
+from fem_reference.runs import store, views
 from fem_reference.runs.store import Run, complete
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import DrivenCase, MuscleCase
-from fem_reference.scenes.muscles import exactly_attached
-from fem_reference.solvers import fenicsx
+from fem_reference.scenes.muscles import exactly_attached, muscles_of, with_muscles
+from fem_reference.solvers.fenicsx.processes import installed
+from fem_reference.solvers.fenicsx.resources import available
+from fem_reference.solvers.fenicsx.session import Session, session, shared
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.variations import (
     Vary,
     by_springs,
     on_larger,
-    on_tetrahedra,
     with_contact,
     with_distances,
     with_half_steps,
@@ -52,13 +52,11 @@ _OF_BARS = [
 MAKING = (*map(Path, _OF_BARS), *map(Path(__file__).with_name, ("muscle_bars.py", "refinement.py", "variations.py")))
 
 # The coarse run of a scene with refined tetrahedra omits the last refinement; that of any other scene has its own mesh, with
-# tetrahedra larger by this factor.
-RATIO = 1.5
+# tetrahedra larger by the first of these factors with which it can be set up.
+RATIOS = (1.5, 1.25)
+_AT_ONCE = 2  # runs for error bars that are solved at a time, if there are as many cores
 # Without a request, error bars are computed only if they take at most this share of the reference's time, as estimated.
 CHEAP = 0.2
-
-# A quadratic element has as many unknowns on the same cells as a linear one on cells of half the size, and does not lock.
-_QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
 
 
 def variations[C: DrivenCase](
@@ -92,8 +90,7 @@ def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBa
         log.info("no error bars: the reference did not converge or has no interior")
         return None
     own = bench.of_muscle()
-    with fenicsx.shared():
-        pair = _pair(own, reference, model)
+    pair = _pair(own, reference, model)
     return made(pair, own, reference.folder, reference)
 
 
@@ -122,9 +119,7 @@ def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | N
     if found is not None or reference.outcome.status != "converged" or reference.fibres is None:
         return found
     own = bench.of_muscle()
-    _, (fine, coarse) = coarser(own.scene)
-    count = 1 + len(needed(own, reference))
-    if count * (fine / coarse) ** 3 > CHEAP:
+    if not own.scene.muscle.refinements or (1 + len(needed(own, reference))) / 2**3 > CHEAP:
         return None
     log.info("error bar: computed without a request, as it takes less than a fifth of the time")
     return obtain(bench, reference, model=False)
@@ -158,9 +153,10 @@ def finer[C: DrivenCase](bench: Bench[C], reference: Run, ratio: float) -> C:
 
 
 def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
-    base, sizes = coarser(bench.scene)
-    larger, springs = f"tetrahedra of {sizes[1]:.3g} mm", by_springs(base)
-    found = solutions(bench, reference, {larger: base}, sizes[1] / sizes[0], model=model and springs)
+    (base, ratio), muscle = coarser(bench), bench.scene.muscle
+    size, springs = muscle.tet_size / 2**muscle.refinements, by_springs(base)
+    sizes, larger = (size, ratio * size), f"tetrahedra of {ratio * size:.3g} mm"
+    found = solutions(bench, reference, {larger: base}, ratio, model=model and springs)
     runs = {name: run for name, (_, run) in found.items()}
     coarse, exact = runs.pop(larger), runs.pop(EXACT, None)
     check_coarser(bench, tets(reference), tets(coarse))
@@ -174,23 +170,45 @@ def solutions[C: DrivenCase](
     source of error halved; and, with ``model``, of this scene with exact attachments, NaN if it cannot be set up.
     """
     ((first, base),) = larger.items()
-    scenes = larger | {name: vary(base) for name, vary in needed(bench, reference).items()}
-    if model:
-        scenes[EXACT] = exactly_attached(base)
+    scenes = larger | ({EXACT: exactly_attached(base)} if model else {})
+    scenes |= {name: vary(base) for name, vary in needed(bench, reference).items()}
+    ranks, count = _at_once(bench, reference)
     # The time falls at least in proportion to the number of tetrahedra.
-    seconds = reference.outcome.cost.get("seconds", 0.0) / ratio**3
-    found = {}
-    for i, (name, changed) in enumerate(scenes.items()):
+    seconds = reference.outcome.cost.get("seconds", 0.0) / ratio**3 / count
+
+    def solved(numbered: tuple[int, str], own: Session | None) -> tuple[Bench[C], Run] | None:
+        i, name = numbered
         left = seconds * (len(scenes) - i)
         log.info("error bar: run %d of %d, %s; about %.0f s left", i + 1, len(scenes), name, left)
         try:
-            found[name] = _solved(bench, changed, name, reference)
+            with shared(own):
+                return _solved(Bench(scenes[name], bench.store, ranks), name, reference)
         except InputError as error:
             if name != EXACT:
                 raise
             log.warning("error bar: the change by exact attachments is not known: %s", error)
-            found[name] = found[first][0], complete(found[first][1], reference.numbers, trusted=False)
-    return found
+            return None
+
+    numbered = list(enumerate(scenes))
+    if count == 1:
+        with shared():
+            runs = tuple(solved(one, None) for one in numbered)
+    else:
+        runs = in_threads(solved, numbered, count * [partial(session, ranks or 1) if installed() else nullcontext])
+    known = {name: run for name, run in zip(scenes, runs, strict=True) if run}
+    other, coarse = known[first]
+    return {name: (other, complete(coarse, reference.numbers, trusted=False)) for name in scenes} | known
+
+
+def _at_once[C: DrivenCase](bench: Bench[C], reference: Run) -> tuple[int | None, int]:
+    """The ranks of each run for error bars, and the number of runs at a time for which there are cores and memory: none needs more
+    than the ``reference``.
+    """
+    asked = getattr(bench.settings(bench.scene.reference, "reference"), "ranks", None)
+    cores = len(os.sched_getaffinity(0)) // (asked or 1)
+    fit = available() / reference.outcome.cost.get("peak_memory_mb", 1.0)
+    count = _AT_ONCE if min(cores, fit) >= _AT_ONCE else 1
+    return (asked or 1 if count > 1 else bench.ranks), count
 
 
 def check_coarser(bench: Bench[MuscleCase], fine: float, coarse: float) -> None:
@@ -211,12 +229,25 @@ def safety(bench: Bench[MuscleCase]) -> float:
     return SAFETY * max(1.0, bench.scene.muscle.tet_size / radius)
 
 
-def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
-    """The case with larger tetrahedra, and the sizes [mm] of its own and of the larger tetrahedra."""
-    size, refinements = case.muscle.tet_size, case.muscle.refinements
-    if refinements:
-        return on_tetrahedra(case, refinements=refinements - 1), (size / 2**refinements, size / 2 ** (refinements - 1))
-    return on_larger(case, RATIO), (size, size * RATIO)
+def coarser[C: DrivenCase](bench: Bench[C]) -> tuple[C, float]:
+    """The case of a bench with larger tetrahedra in every muscle, and the ratio of the sizes: the same for all, as errors of one
+    muscle reach its neighbours. If all muscles are refined, the last refinement is left out. InputError if no case can be set up.
+    """
+    case, failed = bench.scene, list[InputError]()
+    if all(one.refinements for one in muscles_of(case)):
+        return with_muscles(case, lambda one: {"refinements": one.refinements - 1}), 2.0
+    for ratio in RATIOS:
+        larger = on_larger(case, ratio)
+        other = Bench(larger, bench.store, bench.ranks)
+        try:
+            if not store.finished(other.folder(larger.reference, "reference")):
+                other.problem()
+            return larger, ratio
+        except InputError as error:
+            log.info("error bar: tetrahedra %g times as large cannot be set up: %s", ratio, error)
+            failed.append(error)
+    with reported(LARGER):
+        raise failed[0]
 
 
 @contextmanager
@@ -229,11 +260,13 @@ def reported(name: str) -> Iterator[None]:
         raise InputError(f"error bar, {name}", got, want) from error
 
 
-def _solved[C: DrivenCase](bench: Bench[C], case: C, name: str, reference: Run) -> tuple[Bench[C], Run]:
+def _solved[C: DrivenCase](other: Bench[C], name: str, reference: Run) -> tuple[Bench[C], Run]:
     """The bench of a changed scene, and its run over the frames of ``reference``: NaN if not reached or if the run is denied."""
-    other = Bench(case, bench.store, bench.ranks)
+    case = other.scene
+    # Of several muscles the second check needs states, to check curved facets.
+    choice = case.reference if case.parts else without_states(case.reference)
     with reported(name):
-        run = other.obtain(f"reference, {name}", without_states(case.reference), "reference")
+        run = other.obtain(f"reference, {name}", choice, "reference")
     if run.outcome.status != "converged":
         log.info("error bar: %s: %s, %s", name, run.outcome.status, run.outcome.message)
     known = second_check.trusted(other.problem, run)  # type: ignore[arg-type]  # a driven case is of muscles
@@ -257,39 +290,3 @@ def tets(run: Run, fact: str = "tets") -> float:
     """The number of tetrahedra of a run by the name of the ``fact``, NaN if it is not stated."""
     found = run.origin.get("mesh", {}).get(fact)
     return found if isinstance(found, float | int) else math.nan
-
-
-def body_bars(solved: Run) -> BodyBars | None:
-    """The error bars of a run by :func:`solve_body`; None if that did not converge."""
-    if solved.outcome.status != "converged":
-        log.info("no error bars: the body did not converge")
-        return None
-    settings, body = solved.settings, solved.body
-    assert isinstance(settings, fenicsx.BodySettings)  # FEniCSx solved the body
-    assert body is not None
-    other, shared, changes, sharper = sharper_problem(body, settings)
-    log.info("error bars: solving with %s", sharper)
-    found = second_check.confirmed_body(other, fenicsx.solve_body(other, settings.model_copy(update=changes)))
-    if found.outcome.status != "converged":
-        log.info("error bars: with %s: %s, %s", sharper, found.outcome.status, found.outcome.message)
-    states = () if found.outcome.status == "denied" else found.states
-    bars = error_bars.body_bars(solved.states, states, shared, sharper)
-    log.info("error bars: that of the displacement is %.2g %% at the last frame", 100 * bars.displacement[-1])
-    return bars
-
-
-def sharper_problem(
-    body: Body, settings: fenicsx.BodySettings
-) -> tuple[Body, Ints, dict[str, float | str | None], str]:
-    """A more accurate problem: its body, the indices in it of the points of ``body``, changed settings, and changes in words."""
-    changes, said = dict[str, float | str | None](store_state=False), ""
-    # In all other cases a state does not depend on load steps.
-    if body.rubs or any("interval" in effect.needs for effect in body.effects):
-        largest = min(settings.largest_step or np.inf, float(np.diff(body.frames).max(initial=settings.first_step)))
-        changes |= {"first_step": settings.first_step / 2, "largest_step": largest / 2}
-        said = " and load steps of half the length"
-    quadratic = _QUADRATIC.get(settings.element)
-    if quadratic is not None:
-        changes |= {"element": quadratic, "quadrature_degree": None}
-        return body, np.arange(len(body.mesh.points)), changes, f"{quadratic} on the same cells{said}"
-    return *on_finer_cells(body), changes, f"{settings.element} on cells of half the size{said}"

@@ -18,7 +18,7 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.solvers import command, fenicsx, recorded
-from fem_reference.studies import arguments, by_muscle, judging, muscle_bars, refinement
+from fem_reference.studies import arguments, body_refinement, by_muscle, judging, muscle_bars, refinement
 from fem_reference.studies.execution import Bench
 
 STORE = Path("reports/runs")
@@ -123,7 +123,7 @@ def error_bars(
     with reported(progress):
         arguments.check_muscle(muscle, case)
         if arguments.is_of_body(reference, case):
-            return refinement.body_bars(reference)
+            return body_refinement.body_bars(reference)
         scene = arguments.check_case(case)
         arguments.check_run(reference, scene, "reference")
         bench = Bench(scene if scene.parts else casefile.muscle(scene), arguments.free_folder(store, "store"))

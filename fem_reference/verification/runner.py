@@ -7,19 +7,18 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from itertools import count
-from queue import SimpleQueue
 from types import ModuleType
 
 from fem_reference import verification
 from fem_reference.assessment.catalogue import Entry, Finding, Lab, Result, result
 from fem_reference.foundations import modules
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.threads import in_threads
 
 log = logging.getLogger(__name__)
 
@@ -80,28 +79,17 @@ def run(
     """
     ended = threading.Event()
     begin, reporting, done = time.perf_counter(), threading.Lock(), count(1)
-    free = SimpleQueue[Lab]()
 
-    def work(entry: Entry) -> Result:
-        lab = free.get()
+    def work(entry: Entry, lab: Lab) -> Result:
         last = _measured(entry, lab, with_negative_control=entry.name in with_negative_control)
         passed = time.perf_counter() - begin
-        free.put(lab)
         if math.isfinite(last.finding.value) or not ended.wait(HEARD):
             with reporting:
                 _log_progress(last, next(done), len(wanted), passed)
         return last
 
     labs = min(2, len(os.sched_getaffinity(0)), len(wanted))
-    with ThreadPoolExecutor(max(labs, 1)) as pool, ExitStack() as stack:
-        for _ in range(labs):
-            free.put(stack.enter_context(make_lab()))
-        found = [pool.submit(work, entry) for entry in wanted]
-        stack.callback(lambda: [one.cancel() for one in found])  # no thread starts another entry while the labs close
-        stack.callback(ended.set)
-        for one in wait(found, return_when=FIRST_EXCEPTION).done:
-            one.result()
-    return tuple(one.result() for one in found)
+    return in_threads(work, wanted, labs * [make_lab], ended.set)
 
 
 def _measured(entry: Entry, lab: Lab, *, with_negative_control: bool) -> Result:

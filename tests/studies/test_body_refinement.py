@@ -8,20 +8,20 @@ import fem_reference as fr
 from fem_reference.assessment import second_check
 from fem_reference.assessment.run_checks import RunCheck
 from fem_reference.solvers import fenicsx
-from fem_reference.studies import refinement
+from fem_reference.studies import body_refinement
 from tests.assessment.test_body_bars import square_bar
 
 
 def test_load_steps_are_halved_where_time_matters() -> None:
     body = square_bar("Q2/Q1", 1)
     settings = fenicsx.BodySettings(element="Q2/Q1", first_step=0.5, store_state=True)
-    assert refinement.sharper_problem(body, settings)[2] == {"store_state": False}
+    assert body_refinement.sharper_problem(body, settings)[2] == {"store_state": False}
     timed = replace(body, effects=(*body.effects, fr.make_effect("viscosity", eta=1.0)), interval=1.0)
-    *_, changes, said = refinement.sharper_problem(timed, settings)
+    *_, changes, said = body_refinement.sharper_problem(timed, settings)
     assert changes == {"store_state": False, "first_step": 0.25, "largest_step": 0.5}
     assert said == "Q2/Q1 on cells of half the size and load steps of half the length"
     coarse = settings.model_copy(update={"element": "P1/P1", "quadrature_degree": 2})
-    assert refinement.sharper_problem(timed, coarse)[2] | changes == {
+    assert body_refinement.sharper_problem(timed, coarse)[2] | changes == {
         **changes,
         "element": "P2/P1",
         "quadrature_degree": None,
@@ -30,10 +30,10 @@ def test_load_steps_are_halved_where_time_matters() -> None:
 
 def test_without_a_quadratic_element_cells_are_halved() -> None:
     body, settings = square_bar("P1", 1), fenicsx.BodySettings(element="P1")
-    same, shared, changes, said = refinement.sharper_problem(body, settings)
+    same, shared, changes, said = body_refinement.sharper_problem(body, settings)
     assert (same, changes["element"], said) == (body, "P2", "P2 on the same cells")
     assert np.array_equal(shared, np.arange(len(body.mesh.points)))
-    finer, shared, changes, said = refinement.sharper_problem(
+    finer, shared, changes, said = body_refinement.sharper_problem(
         square_bar("P2/P1", 1), fenicsx.BodySettings(element="P2/P1")
     )
     assert len(finer.mesh.cells) == 8 * len(square_bar("P2/P1", 1).mesh.cells)

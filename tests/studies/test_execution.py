@@ -65,13 +65,17 @@ def test_a_run_made_with_other_packages_is_made_again(tmp_path, monkeypatch, cap
     assert "solved before, taken from" in caplog.text
 
 
-def test_frames_are_read_before_anything_is_solved(tmp_path, monkeypatch) -> None:
+def test_frames_are_read_before_anything_is_meshed_or_solved(tmp_path, monkeypatch) -> None:
     made = bench(tmp_path)
     monkeypatch.setattr(made, "reference", lambda: pytest.fail("solved before all input was read"))
+    monkeypatch.setattr(made, "problem", lambda: pytest.fail("meshed before all input was read"))
+    monkeypatch.setattr(made, "_problem", made.problem)
     (tmp_path / "frames").mkdir()
     own = recorded.choice(tmp_path / "frames", "mm", "--candidate")
     with pytest.raises(InputError, match="frames"):
         made.runs([(made.scene.candidate[0], "candidate[0]"), (own, "--candidate")])
+    with pytest.raises(InputError, match="frames"):
+        made.check([(own, "--candidate")])
 
 
 def test_an_element_that_does_not_suit_the_effects_is_named(tmp_path) -> None:

@@ -45,7 +45,7 @@ def test_each_muscle_has_bars_of_its_own_pair_with_all_meshes_coarser(two, monke
     reference = solve(case, store=store)
     assert set(muscle_bars.stored(Bench(case, store), reference)) == set(SIZES)
     bars = {name: error_bars(case, reference, muscle=name, store=store) for name in SIZES}
-    fine, coarse = (Bench(one, store).problem() for one in (case, muscle_bars.coarser(case)[0]))
+    fine, coarse = (Bench(one, store).problem() for one in (case, refinement.coarser(Bench(case, store))[0]))
     # Of order 1.5 in tetrahedra 1.5 times as large; the muscles touch, so that the factor of safety is the greater one of both.
     left = 1.25 / (1.5**1.5 - 1) * max(SIZES[name] / np.sqrt(AREAS[name] / np.pi) for name in SIZES)
     for name, other in (("wide", "thin"), ("thin", "wide")):
@@ -94,6 +94,19 @@ def test_bars_of_a_mesh_that_cannot_be_coarser_are_refused_before_anything_is_so
     assert "error bar, larger tetrahedra: got a scene that cannot be set up (" in said
     assert "a part that is lost, want smaller tetrahedra), want a finer reference" in said
     assert not list((two / "out").rglob("run.json"))
+
+
+def test_further_runs_keep_their_states_in_which_the_second_check_sees_curved_facets(two, monkeypatch) -> None:
+    kept = []
+
+    def solve(problem, settings, sink) -> Outcome:
+        kept.append(settings.store_state)
+        return swell(problem, settings, sink)
+
+    stand_ins.solve_by(monkeypatch, fenicsx, solve)
+    bench = Bench(casefile.read(two), two / "runs")
+    muscle_bars.obtain(bench, bench.reference())
+    assert kept == 4 * [None]  # as the reference by default: yes, unless they are very large
 
 
 @pytest.mark.parametrize("ended", ["denied", "diverged"])
@@ -200,7 +213,7 @@ def test_what_a_muscle_cannot_touch_does_not_make_its_bars_longer(two, monkeypat
     monkeypatch.setattr(muscles, "_gaps", lambda *_: {("wide", "thin"): 1.0})
     bench = Bench(casefile.read(two), two / "runs")
     bars = muscle_bars.obtain(bench, bench.reference())
-    problems = [Bench(one, two).problem().problems for one in (bench.scene, muscle_bars.coarser(bench.scene)[0])]
+    problems = [Bench(one, two).problem().problems for one in (bench.scene, refinement.coarser(bench)[0])]
     for name, size in SIZES.items():
         fine, coarse = (growth(len(one[name].mesh.tets), 0) for one in problems)
         left = 1.25 * 1.2 / 0.5 * max(1.0, size / np.sqrt(AREAS[name] / np.pi))
@@ -227,7 +240,7 @@ def test_muscles_that_touch_only_by_the_smoothing_that_a_variation_halves_press_
 def test_all_muscles_are_coarser_by_the_same_ratio(two, own, wanted, ratio) -> None:
     changes = {f"muscle[{i}].refinements": count for i, count in enumerate(own)}
     case = casefile.read(two, changes=changes)
-    found, by = muscle_bars.coarser(case)
+    found, by = refinement.coarser(Bench(case, two / "runs"))
     assert (tuple(one.refinements for one in found.muscle), by) == (wanted, ratio)
     assert [one.tet_size for one in found.muscle] == [
         (ratio if ratio == 1.5 else 1.0) * one.tet_size for one in case.muscle

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from fem_reference.effects import make as make_effect
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import vertex_areas
 from fem_reference.problems import muscle as meshing
-from fem_reference.report import gallery, pages
+from fem_reference.report import pages
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
@@ -80,10 +81,10 @@ def scene_of(case: Path, more: str = "") -> MuscleCase:
     return casefile.read_muscle(case)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> None:
     monkeypatch.setattr(report, "of_comparison", PAGE)
     monkeypatch.setattr(pages, "write", WRITE)
-    monkeypatch.setattr(gallery, "program", lambda _job, _folder: ["/nowhere/python"])
     path = case / "case.toml"
     path.write_text(path.read_text() + CONTACT)
     status, facts = call(case, "run")
@@ -93,7 +94,8 @@ def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> Non
     status, facts = call(case, "run", "--error-bar")
     assert (status, facts["verdict"]) == (cli.DONE, "inconclusive")
     scene = casefile.read_muscle(case)
-    fine, coarse = (Bench(one, case.parent / "out" / "runs").problem() for one in (scene, refinement.coarser(scene)[0]))
+    bench = Bench(scene, case.parent / "out" / "runs")
+    fine, coarse = bench.problem(), Bench(refinement.coarser(bench)[0], bench.store).problem()
     tets = [built.mesh_facts["tets"] for built in (fine, coarse)]
     surface = fine.surface
     areas = vertex_areas(surface.points, surface.triangles)
@@ -228,7 +230,7 @@ def test_a_change_by_exact_attachments_that_cannot_be_solved_is_not_known(case, 
 
 
 def test_sizes_that_make_no_other_mesh_are_refused(case, monkeypatch) -> None:
-    monkeypatch.setattr(refinement, "RATIO", 1.0)
+    monkeypatch.setattr(refinement, "RATIOS", (1.0,))
     bench = Bench(casefile.read_muscle(case), case.parent / "runs")
     reference = bench.obtain("reference", bench.scene.reference, "reference")
     with pytest.raises(
@@ -238,11 +240,39 @@ def test_sizes_that_make_no_other_mesh_are_refused(case, monkeypatch) -> None:
 
 
 def test_a_scene_that_cannot_be_coarser_is_named(case, monkeypatch) -> None:
-    monkeypatch.setattr(refinement, "RATIO", 10.0)
+    monkeypatch.setattr(refinement, "RATIOS", (10.0, 20.0))
     bench = Bench(casefile.read_muscle(case), case.parent / "runs")
     reference = bench.obtain("reference", bench.scene.reference, "reference")
-    with pytest.raises(InputError, match=r"error bar, tetrahedra of 60 mm: got a scene that cannot be set up"):
+    with pytest.raises(InputError, match=r"error bar, larger tetrahedra: got a scene that cannot be set up"):
         refinement.obtain(bench, reference)
+
+
+@pytest.mark.parametrize(
+    ("cores", "ranks", "at_once"), [(2, None, 2), (8, None, 2), (1, None, 1), (2, 2, 1), (4, 2, 2)]
+)
+def test_two_runs_are_solved_at_a_time_where_there_are_cores(case, monkeypatch, cores, ranks, at_once) -> None:
+    """On larger tetrahedra and with three changes of contact: with two at a time, two meet at a barrier, twice."""
+    monkeypatch.setattr(refinement.os, "sched_getaffinity", lambda _: set(range(cores)))
+    barrier, asked = threading.Barrier(at_once, timeout=30), list[int | None]()
+
+    def solve(problem, settings, sink) -> Outcome:
+        asked.append(settings.ranks)
+        if len(asked) > 1:  # the first is the reference
+            barrier.wait()
+        return swell(problem, settings, sink)
+
+    stand_ins.solve_by(monkeypatch, fenicsx, solve)
+    bench = Bench(scene_of(case, CONTACT), case.parent / "runs", ranks)
+    assert refinement.obtain(bench, bench.reference()) is not None
+    assert asked == [ranks, *4 * [(ranks or 1) if at_once == 2 else ranks]]
+
+
+def test_tetrahedra_are_larger_by_the_next_ratio_where_the_first_cannot_be_set_up(case, monkeypatch) -> None:
+    monkeypatch.setattr(refinement, "RATIOS", (10.0, 1.5))
+    bench = Bench(casefile.read_muscle(case), case.parent / "runs")
+    bars = refinement.obtain(bench, bench.reference())
+    assert bars.sizes == (6.0, 9.0)
+    assert np.isfinite(bars.find("change", "surface_deviation", "rms").values).all()
 
 
 @pytest.mark.parametrize("words", [("run", "--solver", "pbd"), ("run",), ("compare",)])
@@ -309,10 +339,10 @@ def test_a_bar_that_is_cheap_is_made_without_being_asked_for(case) -> None:
 def test_the_coarse_member_of_a_pair_has_the_tetrahedra_before_their_last_refinement(case) -> None:
     scene = scene_of(case)
     nested = scene.model_copy(update={"muscle": scene.muscle.model_copy(update={"refinements": 2})})
-    coarser, sizes = refinement.coarser(nested)
-    assert (coarser.muscle.refinements, sizes) == (1, (1.5, 3.0))
-    coarser, sizes = refinement.coarser(scene)
-    assert (coarser.muscle.tet_size, sizes) == (9.0, (6.0, 9.0))
+    coarser, ratio = refinement.coarser(Bench(nested, case.parent / "runs"))
+    assert (coarser.muscle.refinements, ratio) == (1, 2.0)
+    coarser, ratio = refinement.coarser(Bench(scene, case.parent / "runs"))
+    assert (coarser.muscle.tet_size, ratio) == (9.0, 1.5)
 
 
 def test_contact_is_varied_cause_by_cause(case) -> None:

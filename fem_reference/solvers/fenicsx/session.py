@@ -84,12 +84,14 @@ _shared: ContextVar[Session | None] = ContextVar("shared", default=None)
 
 
 @contextmanager
-def shared() -> Iterator[None]:
+def shared(own: Session | None = None) -> Iterator[None]:
     """A context in which all problems on one rank are solved in one process, which reuses loaded and compiled code; a process that
-    is already shared remains in use. Without FEniCSx nothing is shared.
+    is already shared remains in use. Or, on as many ranks as it has, in that of the session ``own``. Without FEniCSx nothing is
+    shared.
     """
-    with session() if installed() and _shared.get() is None else nullcontext(_shared.get()) as own:
-        before = _shared.set(own)
+    used = own or _shared.get()
+    with session() if used is None and installed() else nullcontext(used) as common:
+        before = _shared.set(common)
         try:
             yield
         finally:
@@ -97,9 +99,9 @@ def shared() -> Iterator[None]:
 
 
 def opened(ranks: int = 1) -> AbstractContextManager[Session]:
-    """The shared session if there is one, for one rank; else a new one. MissingSoftware where FEniCSx is not installed."""
-    common = _shared.get() if ranks == 1 else None
-    if common is None:
+    """The shared session if it has as many ``ranks``; else a new one. MissingSoftware where FEniCSx is not installed."""
+    common = _shared.get()
+    if common is None or common.ranks != ranks:
         return session(ranks)
     require_installed()
     return nullcontext(common)
