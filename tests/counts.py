@@ -217,7 +217,7 @@ ADDED = {
     "contact on attached areas": 20,
     "hard cases of several bodies, paths of pressed points": 170,
     "regions in the export to FEBio, the law corotated": 140,
-    "error bars from two runs at a time, on tetrahedra that can be set up": 105,
+    "error bars from two runs at a time, on tetrahedra that can be set up": 110,
     "lines that end at facets out of reach": 15,
 }
 

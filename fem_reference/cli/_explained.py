@@ -20,7 +20,7 @@ PAGES = (
 
 
 def page_of(message: str) -> str:
-    """The page that explains a ``message``, as a path in the checkout with a heading, else empty.
+    """The page that explains a ``message``: a path in the checkout, with the anchor of a heading; empty if no page explains it.
 
     >>> page_of('case.toml: effect[0].mu: got "1 mm", want a pressure')
     'docs/effects.md'

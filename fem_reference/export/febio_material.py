@@ -1,4 +1,4 @@
-"""The materials of FEBio's input file: the muscle's sum of effects, the axes of its fibres, the rigid bones."""
+"""The materials of FEBio's input file: the sum of the muscle's effects, the axes of its fibres, the rigid bones."""
 
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement
@@ -20,7 +20,7 @@ VOLUME_LAW = 2  # FEBio's pressure_model whose energy is K/2 (J - 1)^2
 
 
 def add_materials(root: Element, problem: MuscleProblem) -> None:
-    """Add the materials of the parts of the muscle, numbered from 1 on, and a rigid material for each bone."""
+    """Add the materials of the parts of the muscle, numbered from 1, and a rigid material for each bone."""
     materials, own = SubElement(root, "Material"), parts(problem)
     for number, part in enumerate(own, start=1):
         _muscle(materials, number, part)
@@ -32,7 +32,7 @@ def add_materials(root: Element, problem: MuscleProblem) -> None:
 
 
 def _muscle(materials: Element, number: int, part: Piece) -> None:
-    """Add one material if FEBio has one for all effects; with ``fibre_passive`` add a mixture, whose stresses FEBio sums."""
+    """Add one material if FEBio has one for all effects; with ``fibre_passive`` add a mixture: FEBio sums its stresses."""
     matrix, volume = matrix_constants(part.effects), volume_constants(part.effects)
     kind = "trans iso Mooney-Rivlin" if "c3" in matrix else "Mooney-Rivlin"
     passive = [effect for effect in part.effects if isinstance(effect, FibrePassive)]
@@ -77,7 +77,7 @@ def matrix_constants(effects: Sequence[Effect]) -> dict[str, float]:
 
 def fibre_constants(effect: FibrePassive) -> dict[str, float]:
     """The constants [MPa, 1] of FEBio's ``muscle material`` that leave only its passive fibres: no shear moduli (``g1``, ``g2``,
-    ``g3``), no activation. FEBio's ``lam_max`` is a stretch relative to rest, ``linear_from`` is relative to the optimal length.
+    ``g3``), no activation. FEBio's ``lam_max`` is a stretch relative to rest; ``linear_from`` is relative to the optimal length.
     """
     off = {"g1": 0.0, "g2": 0.0, "g3": 0.0, "activation": 0.0}
     toe = {"p1": effect.p1, "p2": effect.p2, "Lofl": effect.optimal_stretch, "smax": effect.stress}

@@ -34,7 +34,7 @@ class ClosedSurface(Record):
 
 
 class LabelledTets(Record):
-    """The part inside the tetrahedra of a VTU or MSH file with one of ``labels`` in an ``array`` of the cells."""
+    """The part inside the tetrahedra of a VTU or MSH file whose value in the cell array ``array`` is one of ``labels``."""
 
     file: str
     unit: LengthUnit
@@ -55,8 +55,8 @@ class ShareOfField(Record):
 
 class CaseRegion(Record):
     """A part of the muscle at rest in which effects act (``in``), given by exactly one of ``attachment``, ``patch``, ``surface``,
-    ``tets`` and ``field``. The share of a point in the region grows from 0 at the border to 1 at a depth of ``width``. Regions
-    with the same name are united.
+    ``tets`` and ``field``. The weight of the region's effects at a point (its share) grows from 0 at the border to 1 at a depth of
+    ``width``. Regions with the same name are united.
     """
 
     name: Name

@@ -40,7 +40,7 @@ class _Compiled:
 
 
 def compiled[F: Callable[..., Any]](function: F) -> F:
-    """``function`` as machine code for one thread: compiled at the first call, and stored on disk if the disk can be written."""
+    """``function`` as machine code for one thread: compiled at the first call, and stored on disk if the disk is writable."""
     return cast(F, _Compiled(function))
 
 

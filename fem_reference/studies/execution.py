@@ -99,7 +99,7 @@ class Bench[C: Case]:
 
     @property
     def parts(self) -> "dict[str, Bench[MuscleCase]]":
-        """The bench of each muscle of a case of several muscles, by name; empty for another case."""
+        """The bench of each muscle of a case of several muscles, by name; empty for any other case."""
         scene = self.scene
         if not isinstance(scene, MusclesCase):
             return {}
@@ -192,7 +192,9 @@ class Bench[C: Case]:
         if self.scene.parts and wanted.choice.solver != "fenicsx":
             got = f'"{wanted.choice.solver}" for several muscles'
             raise InputError(
-                join(self.scene.place, "solver"), got, "the reference; in compare, others solve each muscle by itself"
+                join(self.scene.place, "solver"),
+                got,
+                "the reference; in compare, other solvers solve each muscle separately",
             )
         if wanted.choice == self.scene.reference:
             self.check()

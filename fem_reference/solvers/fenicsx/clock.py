@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx.forms import TimeStep
 
-# The time for which forces act on a body at rest to find its initial acceleration, as a fraction of the time of all frames.
+# The duration of the step from rest that determines a body's initial acceleration, as a fraction of the time of all frames.
 _INSTANT = 1e-7
 
 
@@ -48,7 +48,7 @@ class Clock:
             self.step.velocity.x.array[:] = self.velocity
 
     def begins(self) -> bool:
-        """True if a body with inertia first moves in the next load step; its acceleration must be found before."""
+        """True if a body with inertia first moves in the next load step; its acceleration must be found first."""
         return self.resting and self.at >= self.first
 
     def instant(self, unknowns: Floats) -> None:
@@ -63,7 +63,7 @@ class Clock:
 
     @contextmanager
     def slow(self, unknowns: Floats) -> Iterator[None]:
-        """A context in which a step starts from ``unknowns`` and lasts as long as all frames."""
+        """A context in which a step starts from ``unknowns`` and lasts as long as all frames together."""
         if self.step is None:
             yield
             return
@@ -100,7 +100,7 @@ class Clock:
             self.step.velocity.x.array[:] = self.velocity
 
     def _set(self, unknowns: Floats, seconds: float) -> None:
-        assert self.step is not None  # callers check it, or have momentum
+        assert self.step is not None  # callers check this, or an effect has momentum
         self.step.before.x.array[:], self.step.rate.value = unknowns, 1 / seconds
         if self.step.predicted is not None:
             moving = unknowns, self.velocity, self.acceleration

@@ -1,7 +1,7 @@
 """Contact between parts of the surface of a body: forces on the nodes of both sides, and their tangent.
 
-Quadrature points on either side, each with half its area, meet places on the present facets of the other side: so the two sides
-are treated alike. Both forces act along one line, so that forces and moments balance to rounding.
+Quadrature points on either side, each weighted with half of its area, are paired with points on the deformed facets of the other
+side, so the two sides are treated alike. Both forces act along one line, so forces and moments balance to within rounding.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,7 @@ from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoin
 
 # With friction no point may slide farther than this beyond the facet on which it begins a load step, in reference coordinates.
 _FAR = 1.0
-# The unknowns (n,) of a search, the contact and the friction that each pass met, and the subtracted shares of overlaps at rest.
+# The unknowns (n,) of a search, the contact and the friction found in each pass, and the subtracted shares of overlaps at rest.
 State = tuple[Floats, list[tuple[Met, PressedPoints]], list[Rubbed | None], list[float]]
 
 
@@ -47,7 +47,7 @@ class TouchingForces:
             seen = max(depth for one, depth in depths if one is law)
             left = max(seen, 0.0) + unseen(body.mesh, law) if law.relaxed else 0.0
             deep, most = max(seen, overlap(body, law)), law.smoothing + left
-            if deep > most:  # more than contact sees, removes or may leave between points
+            if deep > most:  # deeper than the smoothing, what is removed, and what may lie undetected between points
                 raise ArithmeticError(
                     f'"{law.one}" and "{law.other}" overlap by {deep:.3g} mm; at most {most:.3g} mm is allowed'
                 )
@@ -59,7 +59,7 @@ class TouchingForces:
         self.settle()
 
     def move_to(self, frame: float) -> None:
-        """Subtract, from now on, the parts of overlaps at rest that are left at ``frame``."""
+        """Subtract from now on the fraction of each overlap at rest that remains at ``frame``."""
         for one in self.passes:
             if (share := one.law.allowance(frame)) != one.share:
                 one.share = share
@@ -71,8 +71,8 @@ class TouchingForces:
 
     @staticmethod
     def _passes(body: Body, form: Form, displacement: Displacement) -> tuple[list[Pass], list[Pass | None]]:
-        """The passes of both sides of each law, one where a part touches itself; and by pass the skin around the other part that
-        its points may not touch, None where there is none, or where it is felt.
+        """Two passes for each law, one from each side (only one if a part touches itself). For each pass, also the skin around the
+        other part that its points must not touch; None if there is no such skin, or if it takes part in the contact.
         """
         both = ((law, dict.fromkeys(((law.one, law.other), (law.other, law.one)))) for law in body.touching)
         sides = [(law, *pair) for law, pairs in both for pair in pairs]
@@ -103,7 +103,7 @@ class TouchingForces:
                 self.rubbed = [one.rubbed(met, self.seen) if one and one.acts else None for one, met in pairs]
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
-        """Add the forces to ``residual`` (n,), with their first-order change by ``moves`` (n,) of the unknowns."""
+        """Add the forces to ``residual`` (n,), with their first-order change due to changes ``moves`` (n,) of the unknowns."""
         self.look()
         acting: list[PressedPoints | Rubbed] = [*(one for _, one in self.now), *filter(None, self.rubbed)]
         for one in acting:
@@ -112,7 +112,7 @@ class TouchingForces:
             residual += self.tangent() @ moves
 
     def tangent(self) -> csr_array:
-        """The derivative (n, n) of the residual by the unknowns."""
+        """The derivative (n, n) of the residual with respect to the unknowns."""
         self.look()
         size, found = len(self.seen), csr_array((len(self.seen), len(self.seen)))
         acting: list[PressedPoints | Rubbed] = [*(one for _, one in self.now), *filter(None, self.rubbed)]
@@ -143,7 +143,7 @@ class TouchingForces:
                 force, moment = found.get(name, (np.zeros(3), np.zeros(3)))
                 pull = sign * forces
                 found[name] = force + pull.sum(axis=0), moment + np.cross(places, pull).sum(axis=0)
-                if rubbed:  # friction has no moment about the points
+                if rubbed:  # friction acts at the same points of both parts
                     drag = sign * rubbed.pull[:, :3]
                     turn = np.cross(met.here.point, drag).sum(axis=0)
                     found[name] = found[name][0] + drag.sum(axis=0), found[name][1] + turn
@@ -151,9 +151,9 @@ class TouchingForces:
 
     def scalars(self) -> dict[str, float]:
         """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point, for several laws also the pressure of
-        each (``Touching.pressure_name``); the rest area under pressure, ``touching_area`` [mm2], the mean of both sides; the number
-        of points under pressure, ``touching_points``; the depth of the deepest point at rest, ``touching_overlap_at_rest`` [mm],
-        where it is removed; and with friction its dissipated work since the start, ``touching_friction_work`` [N mm].
+        each (``Touching.pressure_name``); the undeformed area under pressure, averaged over both sides, ``touching_area`` [mm2];
+        the number of points under pressure, ``touching_points``; the depth of the deepest point at rest, if it is removed,
+        ``touching_overlap_at_rest`` [mm]; and with friction its dissipated work since the start, ``touching_friction_work`` [N mm].
         """
         self.look()
         pairs = list(zip(self.passes, self.now, strict=True))
@@ -180,7 +180,7 @@ class TouchingForces:
                 one.settle(met, rubbed.held if rubbed else met.there.at, self.seen)
                 self.dissipated += float(rubbed.lost.sum()) if rubbed else 0.0
         if any(self.rubbing):
-            self.seen = np.full_like(self.seen, np.nan)  # other places hold the points now
+            self.seen = np.full_like(self.seen, np.nan)  # the anchors have moved
             self.look()
         for side, (met, _) in zip(self.passes, self.now, strict=True):
             side.let_fall(met)
@@ -202,7 +202,7 @@ class TouchingForces:
             self.seen = np.full_like(self.seen, np.nan)
 
     def trouble(self, before: Floats, /) -> Trouble | None:
-        """The trouble *diverged* where a point since ``before`` (n,) went through the other part, past its rim or too far."""
+        """The trouble *diverged* if a point went through the other part, past its rim or too far since ``before`` (n,)."""
         self.look()
         columns = self.passes, self.rims, self.settled[1], self.now, self.rubbed
         for one, rim, (last, _), (met, _), rubbed in zip(*columns, strict=True):
@@ -211,14 +211,17 @@ class TouchingForces:
             if rim and not len(lost):
                 lost, way = rim.slid(self.seen, last.points, met.points), f"slid past the rim of {other}"
             if rubbed and not len(lost):
-                lost, way = met.points[rubbed.far > _FAR], f"slid on {other} farther than a facet within a load step"
+                lost, way = (
+                    met.points[rubbed.far > _FAR],
+                    f"slid on {other} by more than the size of a facet within a load step",
+                )
             if len(lost):
                 rest, now = (place_of(one.places(at)[lost[0]]) for at in (np.zeros_like(before), self.seen))
-                where = f"a point of {own} that rests at {rest} and would be at {now}"
+                where = f"a point of {own}, at {rest} in the rest state and at {now} after the step,"
                 return Trouble("diverged", f"contact gives way: {where} {way}")
         return None
 
 
 def touching_of(body: Body, form: Form, displacement: Displacement, spent: Spent) -> TouchingForces | None:
-    """The contact between parts of the surface of a ``body``, None where it names none."""
+    """The contact between parts of the surface of a ``body``, None if the body names none."""
     return TouchingForces(body, form, displacement, spent) if body.touching else None

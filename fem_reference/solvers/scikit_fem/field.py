@@ -36,7 +36,7 @@ class ScikitFieldSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class Flat:
-    """A mesh in the form of scikit-fem: ``mesh``, and for each cell the ``frames`` (m, d, t) and ``origins`` (m, d) that map its
+    """A mesh as scikit-fem represents it: ``mesh``, and for each cell the ``frames`` (m, d, t) and ``origins`` (m, d) that map its
     flat coordinates (t,) to coordinates of the domain (d,).
     """
 
@@ -110,7 +110,7 @@ def _solved(problem: FieldProblem) -> tuple[Floats, Outcome]:
     free = np.isnan(problem.fixed)
     values = np.where(free, 0.0, problem.fixed)
     if not (np.isfinite(A.data).all() and np.isfinite(b).all()):
-        return _failed(len(b), "a coefficient or source has no finite value somewhere")
+        return _failed(len(b), "a coefficient or source is not finite at some point")
     if free.any():
         inner = A[free][:, free].tocsc()
         try:
@@ -155,7 +155,7 @@ def order_of(problem: FieldProblem, basis: Any) -> Any:
 
 
 def _fluxes(problem: FieldProblem) -> Floats:
-    """The flow (N,) through the boundary: the integral of k slope times each hat function, by Gauss's 3-point rule."""
+    """The flow (N,) through the boundary: the integral of ``k * slope`` times each shape function, by Gauss's 3-point rule."""
     b = np.zeros(len(problem.fixed))
     for flux in problem.fluxes:
         ends = problem.mesh.points[flux.facets]
