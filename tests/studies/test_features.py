@@ -95,7 +95,7 @@ def test_contact_between_parts_takes_as_many_steps_as_their_facets_are_passed() 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("change", "measured"), [({}, 25), (QUICK, 15)])
+@pytest.mark.parametrize(("change", "measured"), [pytest.param({}, 25, marks=pytest.mark.nightly), (QUICK, 15)])
 def test_the_time_of_two_muscles_is_expected_within_a_factor_of_three(
     change: dict[str, object], measured: float
 ) -> None:
