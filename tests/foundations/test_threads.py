@@ -6,6 +6,7 @@ from contextlib import contextmanager, nullcontext
 
 import pytest
 
+from fem_reference.foundations import threads
 from fem_reference.foundations.threads import in_threads, made_once
 
 
@@ -38,7 +39,10 @@ def test_results_are_in_order_and_each_context_serves_one_item_at_a_time() -> No
     assert in_threads(work, [], contexts("a", closed)) == ()
 
 
-def test_after_an_error_no_more_work_begins_and_contexts_close() -> None:
+def test_after_an_error_no_more_work_begins_and_contexts_close(monkeypatch) -> None:
+    """Also in the time that it takes until the calling thread hears of it."""
+    wait = threads.wait
+    monkeypatch.setattr(threads, "wait", lambda *found, **until: (wait(*found, **until), time.sleep(0.1))[0])
     begun, closed, ended = list[int](), list[str](), list[bool]()
 
     def work(item: int, _: str) -> None:

@@ -247,9 +247,7 @@ def test_a_scene_that_cannot_be_coarser_is_named(case, monkeypatch) -> None:
         refinement.obtain(bench, reference)
 
 
-@pytest.mark.parametrize(
-    ("cores", "ranks", "at_once"), [(2, None, 2), (2, 2, 1), (4, 2, 2)]
-)
+@pytest.mark.parametrize(("cores", "ranks", "at_once"), [(2, None, 2), (2, 2, 1), (4, 2, 2)])
 def test_two_runs_are_solved_at_a_time_where_there_are_cores(case, monkeypatch, cores, ranks, at_once) -> None:
     """On larger tetrahedra and with three changes of contact: with two at a time, two meet at a barrier, twice."""
     monkeypatch.setattr(refinement.os, "sched_getaffinity", lambda _: set(range(cores)))

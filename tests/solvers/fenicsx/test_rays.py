@@ -120,6 +120,18 @@ def test_contact_fades_where_places_do_not_face_a_point() -> None:
             assert one.pressure(met)[0] == pytest.approx(K * np.maximum(-met.gap, 0), abs=K * 0.02 / 4)
 
 
+@pytest.mark.parametrize("element", KINDS)
+def test_points_above_facets_are_found_up_to_the_smoothing(element) -> None:
+    """The plate is above a flat block, whose smoothing is 0.02."""
+    contact, upper = over_a_block(element)
+    measured(contact)
+    for height, share in ((0.019, 1), (0.021, 0)):
+        contact.unknowns.x.array[upper] = [0.0, 0.0, height - 1.0]
+        met = hits(contact)
+        assert len(met.points) == share * len(contact.passes[1].areas)
+        assert met.gap == pytest.approx(height, abs=1e-14)
+
+
 def test_the_first_crossing_decides() -> None:
     """Points below a block are not in it, although the line behind them meets its top from below; from inside, they are in it."""
     contact, upper = over_a_block("Q1/P0")
