@@ -32,9 +32,8 @@ _STRAIN = 3.0
 _SPRINGS = 1.5
 # The maximum rotation of a bone per load step, on average between two frames: beyond it the sense of rotation is unknown.
 _TURN = 1.01 * math.pi / 2
-_CREASE = (
-    0.1  # between contact points, a crease can penetrate by less of the spacing than a right-angled edge, ``BETWEEN``
-)
+# Between contact points, a crease can penetrate by less of the spacing than a right-angled edge, ``BETWEEN``.
+_CREASE = 0.1
 # Self-contact of a part allows a penetration of less than this fraction of the spacing, for any recorded pressure.
 _OWN = 0.5
 # A bone that penetrates by more than this fraction of half its thickness has broken through contact, whatever the stiffness.
@@ -101,13 +100,13 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
     """Overlap of parts that may touch; allowed are smoothing, compliance, gaps between points, and overlap remaining from rest."""
     for law in body.touching:
-        edge, depth = longest_edge(body.mesh, law), partial(overlap_at, body.mesh, law)
+        edge, between, depth = longest_edge(body.mesh, law), unseen(body.mesh, law), partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
         for state in solved.states:
             pressure = state.scalars.get(law.pressure_name, state.scalars.get("touching_pressure", 0.0))
             most = _OWN / 2 * edge if law.one == law.other else np.inf
             give = np.min([pressure / law.stiffness, state.scalars.get("touching_depth", np.inf), most])
-            given = law.smoothing + float(give) + unseen(body.mesh, law) + law.allowance(state.number) * at_rest
+            given = law.smoothing + float(give) + between + law.allowance(state.number) * at_rest
             yield RunCheck(f"{law.one} in {law.other}", depth(state.points), given, "mm", state.number)
 
 

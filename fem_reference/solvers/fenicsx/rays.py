@@ -22,9 +22,9 @@ _WIDE = 0.1
 _SHALLOW, _NEAR = 0.25, 0.4
 _STAYS = 4.0  # beyond edges, the facet of the last search is taken unless another has this times its pressure
 _ON = 1e-7  # a place is on a facet up to this distance beyond its edges, in reference coordinates
+_AT = 0.02  # the same for the place nearest to a point
 _BENT = 3.0  # the height up to which a facet can face a point inside, in bulges of the facet; 2.1 if it is bent by 45 degrees
 _SAME = 1e-6  # crossings of a line are the same up to this distance [mm]
-_AT = 0.02  # the same for the place nearest to a point
 # A point is in contact with this share of its pressure, or up to this times the depth under its pressure beyond the smoothing.
 _HALF, _YIELDS = 0.5, 2.0
 
