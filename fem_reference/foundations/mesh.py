@@ -14,6 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.rows import distinct
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -140,8 +141,8 @@ def tet_qualities(points: Floats, tets: Ints) -> Floats:
 def boundary(tets: Ints) -> tuple[Ints, Ints]:
     """The triangles (m, 3) that belong to only one of the ``tets`` (k, 4), outward, and this tet (m,) for each."""
     faces = tets[:, TET_FACES].reshape(-1, 3)
-    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    alone = np.sort(first[count == 1])
+    found = distinct(np.sort(faces, axis=1))
+    alone = np.sort(found.first[found.counts == 1])
     return faces[alone], alone // 4
 
 
@@ -192,7 +193,7 @@ def check_closed(surface: Surface) -> Surface:
     check_finite(surface)
     points, triangles = surface.points, surface.triangles
     directed = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    edges, sides = np.unique(np.sort(directed, axis=1), axis=0, return_counts=True)
+    edges, _, _, sides = distinct(np.sort(directed, axis=1))
     for wrong, what, want in (
         (edges[sides == 1], "edges that belong to only one triangle", "a closed surface"),
         (edges[sides > 2], "edges that belong to more than two triangles", "a manifold surface"),
@@ -200,7 +201,7 @@ def check_closed(surface: Surface) -> Surface:
         if len(wrong):
             first = place_of(points[wrong[0]].mean(axis=0))
             raise InputError(surface.place, f"{len(wrong)} {what}, the first at {first}", want)
-    if twice := len(directed) - len(np.unique(directed, axis=0)):
+    if twice := len(directed) - len(distinct(directed).rows):
         got = f"{twice} edges along which both triangles have the same direction"
         raise InputError(surface.place, got, "one orientation")
     if lost := len(points) - len(np.unique(triangles)):

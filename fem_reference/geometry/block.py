@@ -9,6 +9,7 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, enclosed_volume, place_of
+from fem_reference.foundations.rows import distinct
 from fem_reference.geometry.tetrahedra import check_size
 
 Counts = tuple[int, int, int]
@@ -45,8 +46,8 @@ def lattice_skin(counts: Counts) -> tuple[Ints, Ints]:
     """The nodes (n, 3) on the faces of a lattice of ``counts`` cells, and the outward triangles (m, 3) of the skin of its tets."""
     sheets = [_sheet(counts, axis, end) for axis in range(3) for end in (0, 1)]
     corners = np.concatenate(sheets).reshape(-1, 3)
-    nodes, triangles = np.unique(corners, axis=0, return_inverse=True)
-    return nodes, triangles.reshape(-1, 3)
+    found = distinct(corners)
+    return found.rows, found.which.reshape(-1, 3)
 
 
 def _sheet(counts: Counts, axis: int, end: int) -> Ints:

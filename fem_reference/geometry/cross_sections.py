@@ -10,6 +10,7 @@ import igl
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, normals
+from fem_reference.foundations.rows import distinct
 
 # A point whose value is this close to the level counts as above it, so that no triangle has two corners at one point.
 _NUDGE = 1e-4
@@ -88,7 +89,7 @@ def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection |
     ends, rise = _cut(mesh, above)
     if len(ends) == 0:
         return None
-    edges, triangles = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+    edges, _, triangles, _ = distinct(np.sort(ends.reshape(-1, 2), axis=1))
     low, high = above[edges].T
     one, other = (mesh.points[ends] for ends in edges.T)
     points = one + (low / (low - high))[:, None] * (other - one)
@@ -120,7 +121,7 @@ def _greatest(points: Floats, triangles: Ints) -> CrossSection | None:
     triangles = triangles[pieces == np.argmax(areas)]
     used, triangles = np.unique(triangles, return_inverse=True)
     triangles = triangles.reshape(-1, 3)
-    sides = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    sides = distinct(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)).rows
     if len(used) - len(sides) + len(triangles) != 1:
         return None
     upward = normals(points[used][triangles]).sum(axis=0)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal
+from fem_reference.foundations.rows import distinct
 from fem_reference.geometry.distance import distances
 
 # A point closer to the surface than this fraction of its diagonal counts as on it.
@@ -55,8 +56,8 @@ class _Edges:
         self.corners = np.ascontiguousarray(triangles.T)
         both = self.corners[[[1, 2, 0], [2, 0, 1]]]  # (end, corner, m)
         self.sense = np.where(both[0] < both[1], 1.0, -1.0)
-        ends, found = np.unique(np.sort(both, axis=0).reshape(2, -1), axis=1, return_inverse=True)
-        self.ends, self.opposite = ends, found.reshape(self.corners.shape)
+        ends, _, found, _ = distinct(np.sort(both, axis=0).reshape(2, -1).T)
+        self.ends, self.opposite = ends.T, found.reshape(self.corners.shape)
 
 
 def _mean_value_weights(point: Floats, rest: Floats, edges: _Edges) -> Floats:

@@ -12,6 +12,7 @@ import scipy
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, read_only
+from fem_reference.foundations.rows import distinct
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,14 +30,14 @@ class FieldMesh:
     @property
     def edges(self) -> Ints:
         """Every edge once (e, 2), the smaller vertex first, in the order of their vertices."""
-        return np.asarray(np.unique(_all_edges(self.cells), axis=0))
+        return distinct(_all_edges(self.cells)).rows
 
     @property
     def facets(self) -> Ints:
         """The facets that belong to one cell only: the end vertices (f, 1) of an interval, the rim edges (f, 2) of triangles."""
         parts = self.cells.reshape(-1, 1) if self.cells.shape[1] == 2 else _all_edges(self.cells)
-        unique, sides = np.unique(parts, axis=0, return_counts=True)
-        return np.asarray(unique[sides == 1])
+        found = distinct(parts)
+        return found.rows[found.counts == 1]
 
     def edge_numbers(self, pairs: Ints) -> Ints:
         """The index (k,) in ``edges`` of each of the ``pairs`` (k, 2) of vertices; all must be edges."""
@@ -80,7 +81,7 @@ def check(mesh: FieldMesh) -> FieldMesh:
     if len(flat):
         raise InputError(mesh.place, f"cell {flat[0] + 1} of size zero", "cells with a length or an area")
     if mesh.cells.shape[1] == 3:
-        edges, sides = np.unique(_all_edges(mesh.cells), axis=0, return_counts=True)
+        edges, _, _, sides = distinct(_all_edges(mesh.cells))
         if sides.max() > 2:
             a, b = edges[sides.argmax()] + 1
             raise InputError(mesh.place, f"{sides.max()} triangles on the edge of vertices {a} and {b}", "at most two")

@@ -14,6 +14,7 @@ from fem_reference.foundations.mesh import (
     tet_volumes,
     upright,
 )
+from fem_reference.foundations.rows import distinct
 from fem_reference.geometry.coarsening import inflate
 from fem_reference.geometry.distance import distances
 
@@ -59,7 +60,7 @@ def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) 
 
 def _cut(mesh: TetMesh, on_rim: Bools) -> tuple[Ints, Ints, Floats]:
     """The ends (e, 2) of edges, the edges (k, 6) of each tet, and a new point (e, 3) on each; ``on_rim`` (n,) masks rim points."""
-    ends, which = np.unique(np.sort(mesh.tets[:, EDGES].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+    ends, _, which, _ = distinct(np.sort(mesh.tets[:, EDGES].reshape(-1, 2), axis=1))
     first, second = on_rim[ends[:, 0]], on_rim[ends[:, 1]]
     at = np.where(first & ~second, GRADED, np.where(second & ~first, 1 - GRADED, 0.5))[:, None]
     points = mesh.points[ends[:, 0]] * (1 - at) + mesh.points[ends[:, 1]] * at
@@ -72,7 +73,7 @@ def _on_rims(mesh: TetMesh, rims: tuple[str, ...]) -> Bools:
     for name in rims:
         faces = mesh.facets[name]
         sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        edges, count = np.unique(sides, axis=0, return_counts=True)
+        edges, _, _, count = distinct(sides)
         found[edges[count == 1]] = True
     return found
 

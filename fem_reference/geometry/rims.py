@@ -16,6 +16,7 @@ from fem_reference.foundations.mesh import (
     enclosed_volume,
     triangle_areas,
 )
+from fem_reference.foundations.rows import distinct
 from fem_reference.geometry.coarsening import flip_edges, free_part
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.parts import Parts, between, relaxed, widened
@@ -156,7 +157,7 @@ class _Edges:
     @classmethod
     def of(cls, parts: Parts, fine: Surface, shares: Floats) -> "_Edges":
         sides = np.sort(parts.triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
-        ends, which = np.unique(sides, axis=0, return_inverse=True)
+        ends, _, which, _ = distinct(sides)
         fractions = np.linspace(0, 1, _SAMPLES)[:, None]
         samples = parts.points[ends[:, 0]][:, None] * (1 - fractions) + parts.points[ends[:, 1]][:, None] * fractions
         at_points = shares_at(parts.points, fine, shares)

@@ -27,6 +27,7 @@ from fem_reference.foundations.mesh import (
     triangle_areas,
     upright,
 )
+from fem_reference.foundations.rows import distinct
 from fem_reference.geometry.coarsening import coarsen
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import self_intersections
@@ -205,11 +206,11 @@ def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
 
 def _largest_part(tets: Ints, place: str) -> Ints:
     faces = np.sort(tets[:, TET_FACES].reshape(-1, 3), axis=1)
-    _, face, sides = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
+    _, _, face, sides = distinct(faces)
     if sides.max() > 2:
         raise InputError(place, f"a triangle between {sides.max()} tetrahedra from the mesher", "a cleaner surface")
     tet = np.repeat(np.arange(len(tets)), 4)
-    part = connected_parts(tet, len(tets) + face.ravel(), len(tets) + len(sides))[: len(tets)]
+    part = connected_parts(tet, len(tets) + face, len(tets) + len(sides))[: len(tets)]
     return np.asarray(tets[part == np.bincount(part).argmax()])
 
 

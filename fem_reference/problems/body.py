@@ -14,6 +14,7 @@ import numpy as np
 from fem_reference.effects import Effect, in_situ, moduli, regions_named
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, diagonal
+from fem_reference.foundations.rows import distinct
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.regions import Region
 from fem_reference.geometry.skins import Skin
@@ -55,8 +56,8 @@ def outer_facets(mesh: "Cells") -> tuple[Ints, Ints]:
     """The facets that belong to one cell only, as sorted corners (f, 3 or 4) as in ``facet_corners``, and this cell (f,)."""
     sides = np.array(facet_corners(mesh.kind))
     every = mesh.cells[:, sides].reshape(-1, sides.shape[1])
-    _, first, counts = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
-    outer = first[counts == 1]
+    found = distinct(np.sort(every, axis=1))
+    outer = found.first[found.counts == 1]
     return every[outer], outer // len(sides)
 
 

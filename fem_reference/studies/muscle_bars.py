@@ -41,10 +41,10 @@ def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> dict[st
         log.info("no error bars: the reference did not converge")
         return {}
     own, parts = cast("Bench[MusclesCase]", bench), bench.parts
-    base, ratio = refinement.coarser(own)
+    larger, ratio = refinement.coarser(own)
     springs = {name: by_springs(part.scene) for name, part in parts.items()}
-    larger = {refinement.LARGER: base}
-    found = refinement.solutions(own, reference, larger, ratio, model=model and any(springs.values()))
+    model = model and any(springs.values())
+    found = refinement.solutions(own, reference, larger, refinement.LARGER, ratio, model=model)
     split = {name: other.by_muscle(run) for name, (other, run) in found.items()}
     fine, coarse, exact = own.by_muscle(reference), split.pop(refinement.LARGER), split.pop(refinement.EXACT, {})
     bars = dict[str, ErrorBars]()

@@ -153,26 +153,28 @@ def finer[C: DrivenCase](bench: Bench[C], reference: Run, ratio: float) -> C:
 
 
 def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
-    (base, ratio), muscle = coarser(bench), bench.scene.muscle
-    size, springs = muscle.tet_size / 2**muscle.refinements, by_springs(base)
-    sizes, larger = (size, ratio * size), f"tetrahedra of {ratio * size:.3g} mm"
-    found = solutions(bench, reference, {larger: base}, ratio, model=model and springs)
+    (larger, ratio), muscle = coarser(bench), bench.scene.muscle
+    size, springs = muscle.tet_size / 2**muscle.refinements, by_springs(bench.scene)
+    sizes, name = (size, ratio * size), f"tetrahedra of {ratio * size:.3g} mm"
+    found = solutions(bench, reference, larger, name, ratio, model=model and springs)
     runs = {name: run for name, (_, run) in found.items()}
-    coarse, exact = runs.pop(larger), runs.pop(EXACT, None)
+    coarse, exact = runs.pop(name), runs.pop(EXACT, None)
     check_coarser(bench, tets(reference), tets(coarse))
     return Pair(reference, coarse, sizes, runs, exact, safety(bench), springs)
 
 
 def solutions[C: DrivenCase](
-    bench: Bench[C], reference: Run, larger: dict[str, C], ratio: float, *, model: bool
+    bench: Bench[C], reference: Run, larger: Bench[C], first: str, ratio: float, *, model: bool
 ) -> dict[str, tuple[Bench[C], Run]]:
-    """Benches and runs, by name: of the scene on ``larger`` tetrahedra, of ``ratio`` times the size; of this scene with each other
-    source of error halved; and, with ``model``, of this scene with exact attachments, NaN if it cannot be set up.
+    """Benches and runs, by name: of the case on ``larger`` tetrahedra, by the name ``first``; of the same case with each other
+    source of error halved; and, with ``model``, of the same case with exact attachments, NaN if it cannot be set up.
+
+    ``ratio``: the size of the larger tetrahedra divided by the size of those of the ``reference``.
     """
-    ((first, base),) = larger.items()
-    scenes = larger | ({EXACT: exactly_attached(base)} if model else {})
+    base = larger.scene
+    scenes = {first: base} | ({EXACT: exactly_attached(base)} if model else {})
     scenes |= {name: vary(base) for name, vary in needed(bench, reference).items()}
-    ranks, count = _at_once(bench, reference)
+    larger.ranks, count = _at_once(bench, reference)
     # The time falls at least in proportion to the number of tetrahedra.
     seconds = reference.outcome.cost.get("seconds", 0.0) / ratio**3 / count
 
@@ -182,7 +184,8 @@ def solutions[C: DrivenCase](
         log.info("error bar: run %d of %d, %s; about %.0f s left", i + 1, len(scenes), name, left)
         try:
             with shared(own):
-                return _solved(Bench(scenes[name], bench.store, ranks), name, reference)
+                other = larger if name == first else Bench(scenes[name], bench.store, larger.ranks)
+                return _solved(other, name, reference)
         except InputError as error:
             if name != EXACT:
                 raise
@@ -194,7 +197,9 @@ def solutions[C: DrivenCase](
         with shared():
             runs = tuple(solved(one, None) for one in numbered)
     else:
-        runs = in_threads(solved, numbered, count * [partial(session, ranks or 1) if installed() else nullcontext])
+        runs = in_threads(
+            solved, numbered, count * [partial(session, larger.ranks or 1) if installed() else nullcontext]
+        )
     known = {name: run for name, run in zip(scenes, runs, strict=True) if run}
     other, coarse = known[first]
     return {name: (other, complete(coarse, reference.numbers, trusted=False)) for name in scenes} | known
@@ -229,20 +234,21 @@ def safety(bench: Bench[MuscleCase]) -> float:
     return SAFETY * max(1.0, bench.scene.muscle.tet_size / radius)
 
 
-def coarser[C: DrivenCase](bench: Bench[C]) -> tuple[C, float]:
-    """The case of a bench with larger tetrahedra in every muscle, and the ratio of the sizes: the same for all, as errors of one
+def coarser[C: DrivenCase](bench: Bench[C]) -> tuple[Bench[C], float]:
+    """A bench of the case with larger tetrahedra in every muscle, and the ratio of the sizes: the same for all, as errors of one
     muscle reach its neighbours. If all muscles are refined, the last refinement is left out. InputError if no case can be set up.
     """
     case, failed = bench.scene, list[InputError]()
     if all(one.refinements for one in muscles_of(case)):
-        return with_muscles(case, lambda one: {"refinements": one.refinements - 1}), 2.0
+        unrefined = with_muscles(case, lambda one: {"refinements": one.refinements - 1})
+        return Bench(unrefined, bench.store, bench.ranks), 2.0
     for ratio in RATIOS:
         larger = on_larger(case, ratio)
         other = Bench(larger, bench.store, bench.ranks)
         try:
             if not store.finished(other.folder(larger.reference, "reference")):
                 other.problem()
-            return larger, ratio
+            return other, ratio
         except InputError as error:
             log.info("error bar: tetrahedra %g times as large cannot be set up: %s", ratio, error)
             failed.append(error)

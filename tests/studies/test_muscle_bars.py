@@ -45,7 +45,7 @@ def test_each_muscle_has_bars_of_its_own_pair_with_all_meshes_coarser(two, monke
     reference = solve(case, store=store)
     assert set(muscle_bars.stored(Bench(case, store), reference)) == set(SIZES)
     bars = {name: error_bars(case, reference, muscle=name, store=store) for name in SIZES}
-    fine, coarse = (Bench(one, store).problem() for one in (case, refinement.coarser(Bench(case, store))[0]))
+    fine, coarse = (one.problem() for one in (Bench(case, store), refinement.coarser(Bench(case, store))[0]))
     # Of order 1.5 in tetrahedra 1.5 times as large; the muscles touch, so that the factor of safety is the greater one of both.
     left = 1.25 / (1.5**1.5 - 1) * max(SIZES[name] / np.sqrt(AREAS[name] / np.pi) for name in SIZES)
     for name, other in (("wide", "thin"), ("thin", "wide")):
@@ -213,7 +213,7 @@ def test_what_a_muscle_cannot_touch_does_not_make_its_bars_longer(two, monkeypat
     monkeypatch.setattr(muscles, "_gaps", lambda *_: {("wide", "thin"): 1.0})
     bench = Bench(casefile.read(two), two / "runs")
     bars = muscle_bars.obtain(bench, bench.reference())
-    problems = [Bench(one, two).problem().problems for one in (bench.scene, refinement.coarser(bench)[0])]
+    problems = [one.problem().problems for one in (bench, refinement.coarser(bench)[0])]
     for name, size in SIZES.items():
         fine, coarse = (growth(len(one[name].mesh.tets), 0) for one in problems)
         left = 1.25 * 1.2 / 0.5 * max(1.0, size / np.sqrt(AREAS[name] / np.pi))
@@ -241,8 +241,8 @@ def test_all_muscles_are_coarser_by_the_same_ratio(two, own, wanted, ratio) -> N
     changes = {f"muscle[{i}].refinements": count for i, count in enumerate(own)}
     case = casefile.read(two, changes=changes)
     found, by = refinement.coarser(Bench(case, two / "runs"))
-    assert (tuple(one.refinements for one in found.muscle), by) == (wanted, ratio)
-    assert [one.tet_size for one in found.muscle] == [
+    assert (tuple(one.refinements for one in found.scene.muscle), by) == (wanted, ratio)
+    assert [one.tet_size for one in found.scene.muscle] == [
         (ratio if ratio == 1.5 else 1.0) * one.tet_size for one in case.muscle
     ]
 

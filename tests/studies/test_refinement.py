@@ -95,7 +95,7 @@ def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> Non
     assert (status, facts["verdict"]) == (cli.DONE, "inconclusive")
     scene = casefile.read_muscle(case)
     bench = Bench(scene, case.parent / "out" / "runs")
-    fine, coarse = bench.problem(), Bench(refinement.coarser(bench)[0], bench.store).problem()
+    fine, coarse = bench.problem(), refinement.coarser(bench)[0].problem()
     tets = [built.mesh_facts["tets"] for built in (fine, coarse)]
     surface = fine.surface
     areas = vertex_areas(surface.points, surface.triangles)
@@ -338,9 +338,9 @@ def test_the_coarse_member_of_a_pair_has_the_tetrahedra_before_their_last_refine
     scene = scene_of(case)
     nested = scene.model_copy(update={"muscle": scene.muscle.model_copy(update={"refinements": 2})})
     coarser, ratio = refinement.coarser(Bench(nested, case.parent / "runs"))
-    assert (coarser.muscle.refinements, ratio) == (1, 2.0)
+    assert (coarser.scene.muscle.refinements, ratio) == (1, 2.0)
     coarser, ratio = refinement.coarser(Bench(scene, case.parent / "runs"))
-    assert (coarser.muscle.tet_size, ratio) == (9.0, 1.5)
+    assert (coarser.scene.muscle.tet_size, ratio) == (9.0, 1.5)
 
 
 def test_contact_is_varied_cause_by_cause(case) -> None:
