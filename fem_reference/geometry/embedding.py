@@ -1,6 +1,7 @@
 """Point location in tetrahedra: the tetrahedron of each point and its barycentric coordinates, which interpolate a solution."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import igl
 import numpy as np
@@ -51,18 +52,27 @@ class Locator:
             tets[lost] = self._containing(points[lost] + _NUDGE * self.diagonal * np.array(corner))
             lost = lost[tets[lost] < 0]
         outside = np.zeros(len(points))
-        skin = distances(points[lost], self.skin)
-        outside[lost] = skin.distance
-        tets[lost] = self.behind[self._first_of_ties(skin)]
+        if len(lost):
+            skin = distances(points[lost], self.skin)
+            outside[lost] = skin.distance
+            tets[lost] = self.behind[self._first_of_ties(skin)]
         return Embedding(tets, barycentric(points, self.mesh.points[self.mesh.tets[tets]]), outside)
 
     def _first_of_ties(self, skin: Distances) -> Ints:
         """The closest boundary triangles (n,); at an edge or corner the first of them, so that rounding does not decide."""
         chosen, inner = np.array(skin.triangle), skin.barycentric
         for i in np.flatnonzero((inner < _TIE).any(axis=1)):
-            shared = self.faces[chosen[i]][inner[i] >= _TIE]
-            chosen[i] = np.argmax(np.isin(self.faces, shared).sum(axis=1) == len(shared))
+            chosen[i] = self._firsts[frozenset(self.faces[chosen[i]][inner[i] >= _TIE].tolist())]
         return chosen
+
+    @cached_property
+    def _firsts(self) -> dict[frozenset[int], int]:
+        """The first boundary triangle at each edge and corner of the boundary."""
+        firsts: dict[frozenset[int], int] = {}
+        for i, (a, b, c) in enumerate(self.faces.tolist()):
+            for shared in ((a,), (b,), (c,), (a, b), (b, c), (c, a)):
+                firsts.setdefault(frozenset(shared), i)
+        return firsts
 
     def _containing(self, points: Floats) -> Ints:
         if len(points) == 0:

@@ -63,14 +63,16 @@ class FibreField:
 
     def directions(self, points: Floats) -> Floats:
         """Unit vectors (m, 3) of steepest ascent at ``points`` (m, 3)."""
-        found = self.locator.embed(points).interpolate(self.mesh, self.gradients)
-        return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1), np.finfo(float).tiny)[:, None])
+        return self.sampled(points)[0]
 
-    def between_attachments(self, points: Floats) -> Bools:
-        """Mask (m,) of the ``points`` (m, 3) that are in the mesh and on no attachment."""
+    def sampled(self, points: Floats) -> tuple[Floats, Bools]:
+        """Unit vectors (m, 3) of steepest ascent at ``points`` (m, 3), and a mask (m,) of the points in the mesh and not on
+        an attachment.
+        """
         embedding = self.locator.embed(points)
-        values = embedding.interpolate(self.mesh, self.values)
-        return np.asarray((embedding.outside == 0) & (values > _NEAR) & (values < 1 - _NEAR))
+        ascent, values = (embedding.interpolate(self.mesh, one) for one in (self.gradients, self.values))
+        unit = ascent / np.maximum(np.linalg.norm(ascent, axis=1), np.finfo(float).tiny)[:, None]
+        return np.asarray(unit), np.asarray((embedding.outside == 0) & (values > _NEAR) & (values < 1 - _NEAR))
 
 
 def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
@@ -195,12 +197,12 @@ def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[
     """Lines from ``seeds`` (k, 3) along (``sign`` 1) or against (-1) the field to ``goal`` (m, 3), and a mask (k,) of arrival."""
     step = sign * field.size / 4
     lines = [[seed] for seed in seeds]
-    going, points = np.arange(len(seeds)), seeds
+    going, points, ascent = np.arange(len(seeds)), seeds, field.directions(seeds)
     # A line four times as long as the mesh must run in circles.
     for _ in range(4 * int(field.locator.diagonal / abs(step))):
-        points = _runge_kutta(field, points, step)
-        goes_on = field.between_attachments(points)
-        going, points = going[goes_on], points[goes_on]
+        points = _runge_kutta(field, points, ascent, step)
+        ascent, goes_on = field.sampled(points)
+        going, points, ascent = going[goes_on], points[goes_on], ascent[goes_on]
         for i, point in zip(going, points, strict=True):
             lines[i].append(point)
         if len(going) == 0:
@@ -211,9 +213,10 @@ def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[
     return whole, ends.distance <= field.size / 2
 
 
-def _runge_kutta(field: FibreField, points: Floats, step: float) -> Floats:
-    """``points`` (k, 3) advanced by one ``step`` [mm], with the classical fourth-order Runge-Kutta method."""
-    first = field.directions(points)
+def _runge_kutta(field: FibreField, points: Floats, first: Floats, step: float) -> Floats:
+    """``points`` (k, 3) advanced by one ``step`` [mm] with the classical fourth-order Runge-Kutta method. ``first`` (k, 3): the
+    directions at the points.
+    """
     second = field.directions(points + step / 2 * first)
     third = field.directions(points + step / 2 * second)
     fourth = field.directions(points + step * third)
