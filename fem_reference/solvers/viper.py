@@ -38,12 +38,10 @@ _AROUND, _CARRIERS = 6, 12
 
 
 class ViperSettings(Record):
-    """Settings of VIPER.
-
-    ``points``: number of points of each rod. ``iterations``: number of sweeps over all constraints for each frame number.
+    """``points``: number of points of each rod. ``iterations``: number of sweeps over all constraints for each frame number.
     ``stretch``, ``bending``, ``volume``, ``bundle``: stiffness of each kind of constraint in a sweep, from 0 (off) to 1.
-    ``contact``: if True, the points of rods stay at least a rod radius away from bones, or at their rest distance if that is less,
-    and the surface is moved out of bones. The default is False.
+    ``contact``: if true, the points of rods stay at least one rod radius away from bones, or at least at their rest distance if that
+    is less, and the surface is moved out of bones. The default is false.
     """
 
     points: Annotated[int, Field(ge=4, le=1000), Trade((4, 6, 12))]
