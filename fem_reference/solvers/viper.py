@@ -40,7 +40,7 @@ _AROUND, _CARRIERS = 6, 12
 class ViperSettings(Record):
     """``points``: number of points of each rod. ``iterations``: number of sweeps over all constraints for each frame number.
     ``stretch``, ``bending``, ``volume``, ``bundle``: stiffness of each kind of constraint in a sweep, from 0 (off) to 1.
-    ``contact``: if true, the points of rods stay at least one rod radius away from bones, or at least at their rest distance if that
+    ``contact``: if true, the points of rods stay at least one rod radius away from bones, or at least at their rest distance if it
     is less, and the surface is moved out of bones. The default is false.
     """
 
