@@ -40,8 +40,8 @@ _AROUND, _CARRIERS = 6, 12
 class ViperSettings(Record):
     """``points``: number of points of each rod. ``iterations``: number of sweeps over all constraints for each frame number.
     ``stretch``, ``bending``, ``volume``, ``bundle``: stiffness of each kind of constraint in a sweep, from 0 (off) to 1.
-    ``contact``: if true, the points of rods stay at least one rod radius away from bones, or at least at their rest distance if it
-    is less, and the surface is moved out of bones. The default is false.
+    ``contact``: if true, each point of a rod stays away from bones by the rod radius (or by its distance at rest, if that is less),
+    and the surface is moved out of bones. The default is false.
     """
 
     points: Annotated[int, Field(ge=4, le=1000), Trade((4, 6, 12))]
