@@ -81,7 +81,7 @@ def _uncertainty_bands(file: str) -> str:
         title = _QUANTITIES.get(one["quantity"], one["title"])
         rows.append((title, *sizes, f"{100 * (one['error'] or 0):.2g} %", *shares))
     head = ("quantity", "maximum width of the band", "maximum error bar", "variance missed by the surrogate")
-    return table(file, (*head, *(f"variance due to {one}" for one in words)), rows)
+    return table(file, (*head, *(f"variance due to {one}: alone / with interactions" for one in words)), rows)
 
 
 def _uncertainty_candidates(file: str) -> str:

@@ -61,7 +61,7 @@ def _standings_rows(file: str) -> str:
         times = [row["seconds_per_frame"] for row in own.values() if row["seconds_per_frame"] and not _failed(row)]
         time = f"{1e3 * median(times):.3g} ms" if times else "-"
         found.append((group, f"`{name}`", *(_standing(own.get(case)) for case in cases), time))
-    head = ("kind of method", "solver", *(f"`{case}`" for case in cases), "median time per frame")
+    head = ("kind of method", "solver", *(f"`{case}`, mm" for case in cases), "median time per frame")
     return table(file, head, sorted(found))
 
 
@@ -108,7 +108,8 @@ def _standings_parts(file: str) -> str:
         (f"`{row['name']}`", f"`{row['case']}`", f"{row['rms']:.3g}", *(f"{row['split'][name]:.2g}" for name in names))
         for row in rows
     ]
-    return table(file, ("solver", "case", "total error", *(_PART_NAMES.get(name, name) for name in names)), found)
+    parts = (f"{_PART_NAMES.get(name, name)}, mm" for name in names)
+    return table(file, ("solver", "case", "total error, mm", *parts), found)
 
 
 MEASUREMENTS = {
