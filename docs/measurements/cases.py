@@ -54,17 +54,34 @@ def _uncertainty(found: dict[str, Any]) -> Any:
     return {"runs": found["runs"], "failures": len(found["failures"]), "seconds": found["seconds"]} | rows
 
 
+# Words for the headings of tables, for parameters and quantities whose own titles are too terse for readers of the page.
+_PARAMETERS = {
+    "fibres turned angle": "the fibre angle",
+    "attachment origin outline shift by": "the position of the origin",
+    "attachment insertion outline shift by": "the position of the insertion",
+    "attachment origin stiffness": "the stiffness of the origin",
+    "attachment insertion stiffness": "the stiffness of the insertion",
+}
+_QUANTITIES = {
+    "surface_deviation.rms": "Distance of the surface from the nominal result, rms",
+    "force on femur": "Force of the muscle on the femur",
+}
+
+
 def _uncertainty_bands(file: str) -> str:
     measured = kept(file)["measured"]
     keys, titles = zip(*((one["key"], one["title"]) for one in measured["parameters"]), strict=True)
+    words = (_PARAMETERS.get(title, "`{1}` of `{0}`".format(*title.split())) for title in titles)
     rows = []
     for one in measured["bands"]:
         sizes = (f"{number(one[name])} {one['unit']}" if one[name] else "none" for name in ("width", "bar"))
         shares = (
             f"{100 * one['first'][key]:.0f} / {100 * one['total'][key]:.0f} %" if one["first"] else "" for key in keys
         )
-        rows.append((one["title"], *sizes, f"{100 * (one['error'] or 0):.2g} %", *shares))
-    return table(file, ("quantity", "band, greatest width", "error bar", "error of the surrogate", *titles), rows)
+        title = _QUANTITIES.get(one["quantity"], one["title"])
+        rows.append((title, *sizes, f"{100 * (one['error'] or 0):.2g} %", *shares))
+    head = ("quantity", "maximum width of the band", "maximum error bar", "variance missed by the surrogate")
+    return table(file, (*head, *(f"variance due to {one}: alone / with interactions" for one in words)), rows)
 
 
 def _uncertainty_candidates(file: str) -> str:
@@ -74,7 +91,7 @@ def _uncertainty_candidates(file: str) -> str:
     for one in measured["placed"]:
         beyond = f" by {number(one['worst'], 2)}" if one["worst"] and one["word"] != "no answer" else ""
         rows.setdefault(one["candidate"], {})[one["quantity"]] = one["word"] + beyond
-    head = ("candidate", *(f"{one['title']}, {one['unit']}" for one in bands))
+    head = ("candidate", *(f"{_QUANTITIES.get(one['quantity'], one['title'])}, {one['unit']}" for one in bands))
     cells = ((f"`{name}`", *(row.get(one["quantity"], "") for one in bands)) for name, row in rows.items())
     return table(file, head, cells)
 

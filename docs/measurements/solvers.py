@@ -61,7 +61,8 @@ def _standings_rows(file: str) -> str:
         times = [row["seconds_per_frame"] for row in own.values() if row["seconds_per_frame"] and not _failed(row)]
         time = f"{1e3 * median(times):.3g} ms" if times else "-"
         found.append((group, f"`{name}`", *(_standing(own.get(case)) for case in cases), time))
-    return table(file, ("kind", "solver", *(f"`{case}`" for case in cases), "time per frame, median"), sorted(found))
+    head = ("kind of method", "solver", *(f"`{case}`, mm" for case in cases), "median time per frame")
+    return table(file, head, sorted(found))
 
 
 def _standing(row: dict[str, Any] | None) -> str:
@@ -78,7 +79,10 @@ def _failed(row: dict[str, Any]) -> bool:
 def _learned_rows() -> str:
     """The mean error of each solver on poses and on shapes that were not used in training."""
     rows = kept("learned")["measured"]
-    counts = {row["split"]: f"{row['split']}s not seen in training, {row['muscles']} muscles" for row in rows}
+    counts = {
+        row["split"]: f"new {row['split']}s, {row['muscles']} muscles: mean error, processor time per muscle"
+        for row in rows
+    }
     found = []
     for name in sorted(
         {row["solver"] for row in rows}, key=lambda name: [row["error"] for row in rows if row["solver"] == name]
@@ -90,7 +94,10 @@ def _learned_rows() -> str:
             for split, row in own.items()
         ]
         found.append(("Learned" if own["pose"]["learned"] else "Not learned", f"`{name}`", *cells))
-    return table("learned", ("kind", "solver", *counts.values()), found)
+    return table("learned", ("kind of solver", "solver", *counts.values()), found)
+
+
+_PART_NAMES = {"left out": "omitted effects"}
 
 
 def _standings_parts(file: str) -> str:
@@ -101,7 +108,8 @@ def _standings_parts(file: str) -> str:
         (f"`{row['name']}`", f"`{row['case']}`", f"{row['rms']:.3g}", *(f"{row['split'][name]:.2g}" for name in names))
         for row in rows
     ]
-    return table(file, ("solver", "case", "error", *names), found)
+    parts = (f"{_PART_NAMES.get(name, name)}, mm" for name in names)
+    return table(file, ("solver", "case", "total error, mm", *parts), found)
 
 
 MEASUREMENTS = {

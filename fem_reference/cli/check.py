@@ -1,7 +1,7 @@
-"""The verb ``check``: a candidate compared with its own earlier results and with the reference, for continuous integration.
+"""The verb ``check``: compare a candidate with its earlier results and with the reference, for continuous integration.
 
-An inconclusive result has exit status 0: an uncertain reference is not the fault of the checked change. The text and the Markdown
-file call such a result inconclusive, the JUnit file skipped.
+An inconclusive result has exit status 0, because the change under test is not responsible for the error bar of the reference. The
+printed text and the Markdown file report such a result as inconclusive; the JUnit file reports it as skipped.
 """
 
 import argparse
@@ -18,27 +18,29 @@ from fem_reference.report import regression_texts
 from fem_reference.scenes import casefile
 from fem_reference.studies import arguments, by_muscle, muscle_bars
 
-HELP = "judge a candidate against its earlier results and against the reference, for continuous integration"
+HELP = "compare a candidate with its earlier results and with the reference, for continuous integration"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     share(parser, "case", "--set")
-    either = "a candidate of the case or a folder of frames"
+    either = "name of a candidate of the case, or a folder of frames"
     parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=either)
     share(parser, "--unit")
-    one = "the muscle to judge, if the case has several; the reference solves them together, a candidate one by one"
+    one = "muscle to check, if the case has several; the reference solves all muscles together, a candidate only this muscle"
     parser.add_argument("--muscle", default="", metavar="NAME", help=one)
-    past = "JSON file of the candidate's earlier measures"
+    past = "JSON file with the earlier results of the candidate"
     parser.add_argument("--baseline", type=Path, required=True, metavar="FILE", help=past)
-    anew = "rewrite the baseline from the current measures; its tolerances and limits are kept"
+    anew = "replace the results in the baseline with the current results; keep the tolerances and limits"
     parser.add_argument("--update", action="store_true", help=anew)
-    parser.add_argument("--junit", type=Path, metavar="FILE", help="write the judgements as JUnit XML")
-    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the worst judgements for a pull request")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="write all verdicts to FILE as JUnit XML")
+    parser.add_argument(
+        "--markdown", type=Path, metavar="FILE", help="write the worst verdicts to FILE, for a pull request"
+    )
     share(parser, "--error-bar", "--ranks")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Judge a candidate by means of its baseline, which ``--update`` writes first."""
+    """Check a candidate against its baseline and the reference. With ``--update``, first update the baseline."""
     begin = time.perf_counter()
     case, muscle = scene_of(options), options.muscle
     arguments.check_muscle(muscle, case, "--muscle")
@@ -48,11 +50,11 @@ def run(options: argparse.Namespace) -> int:
     whole = checked_bench(case, options, [(entry, place)])
     bench = whole.parts[muscle] if muscle else whole.of_muscle()
     scene, entry = bench.scene, by_muscle.of_part(whole.found(entry, place), place, muscle) if muscle else entry
-    # Errors of the baseline are reported before anything is solved.
+    # Report errors in the baseline file before solving anything.
     (baseline.check if options.update else baseline.read)(options.baseline, scene, entry.name)
-    candidate = bench.obtain(entry.name, entry, place)  # before the reference, as the candidate may be bad input
+    candidate = bench.obtain(entry.name, entry, place)  # before the reference, because the candidate may be bad input
     solved = whole.reference()
-    # With the folder of all muscles: a baseline names it, so that a changed neighbour is reported.
+    # The folder is that of the run of all muscles. The baseline stores it, so a change of a neighbouring muscle is reported.
     reference = replace(by_muscle.split(whole, solved)[muscle], folder=solved.folder) if muscle else solved
     failed = [one for one in (reference, candidate) if one.outcome.status != "converged"]
     if failed:

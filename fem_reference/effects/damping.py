@@ -1,4 +1,4 @@
-"""Drag of the ground on moving tissue, which keeps a free body from drifting and slows the departure from an unstable state."""
+"""Viscous drag relative to the ground. It keeps a free body from drifting and slows the departure from an unstable state."""
 
 from typing import Any, ClassVar
 
@@ -9,12 +9,13 @@ from fem_reference.foundations.units import VolumeDamping
 
 
 class Damping(Energy):
-    """A force per unit rest volume of ``-coefficient v``, with v the velocity relative to the ground.
+    """A drag force ``-coefficient v`` per unit rest volume, where v is the velocity relative to the ground.
 
-    Over a load step v is ``rate (u - before)`` (implicit Euler), and the force is minus the derivative of
-    ``coefficient / 2 rate |u - before|^2``: a potential of the step, not a stored energy.
+    In a load step, implicit Euler gives v = ``rate (u - before)``, where u and ``before`` are the displacements at the end and at
+    the start of the step, and ``rate`` is one over the duration of the step. The force is minus the derivative of
+    ``coefficient / 2 rate |u - before|^2`` with respect to u. This potential belongs to the step; it is not a stored energy.
 
-    ``coefficient``: [MPa s/mm^2].
+    ``coefficient``: drag coefficient [MPa s/mm^2].
     """
 
     outer: ClassVar[bool] = True
@@ -25,18 +26,18 @@ class Damping(Energy):
     coefficient: VolumeDamping
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The sag of a beam under the drag, and the shift of a bar along its axis."""
+        """The lag estimated from the deflection of a beam under transverse drag and the shift of a bar under axial drag."""
         force, sideways = (self.coefficient * scene.in_time(speed) for speed in (scene.speed, scene.sideways))
         rule, stress = "drag per cross-section divided by the shear modulus", force * scene.length
         lag = scene.lag(scene.bend(sideways) + scene.draw(force))
         return Indicator(rule, stress / scene.shear, lag, stress)
 
     def resultant(self, shape: Shape) -> Wrench | None:
-        """The drag on the entire body."""
+        """The force and moment of the drag on the entire body, None if the motion is not known."""
         found = shape.motion()
         return None if found is None else Wrench(*(-self.coefficient * one for one in found))
 
     def energy(self, state: State) -> Any:
-        """The potential of the step per unit rest volume [MPa]."""
+        """The potential of the drag in the present load step, per unit rest volume [MPa]."""
         square = sum((now - before) ** 2 for now, before in zip(state.displacement, state.before, strict=True))
         return self.coefficient / 2 * state.rate * square

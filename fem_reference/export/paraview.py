@@ -1,8 +1,10 @@
-"""Runs of a case as one collection for ParaView: named blocks in the rest state, which the array ``displacement`` moves.
+"""Export of all runs of a case to ParaView, as a collection of named blocks.
 
-forces.csv               force, its point of application, moment and moment arm of each run by frame and bone
-runs.pvd                 the time of each frame [s], or its number if the case has no time
-frames/frame_0010.vtm    reference and candidates (muscle, fibres, interior of the reference), bones, attachments
+The points of each block are at rest. The ParaView filter "Warp By Vector" moves them by the array ``displacement``. The files are:
+
+forces.csv               force, point of application, moment and moment arm for each run, frame and bone
+runs.pvd                 list of the frames with their times [s], or with their numbers if the case states no time
+frames/frame_0010.vtm    blocks of a frame: reference and candidates (muscle, fibres, interior of the reference), bones, attachments
 """
 
 import logging
@@ -34,17 +36,20 @@ log = logging.getLogger(__name__)
 
 INDEX = "runs.pvd"
 _NO_STATES = """
-The reference was solved without `reference.store_state = true`, so the arrays that follow from its states are missing.
+The reference was solved without `reference.store_state = true`, so the arrays that are computed from stored states are missing.
 """
-# Results that are evaluated from states; displacement is always written.
+# Arrays that are computed from stored states. The displacement is always written.
 _EVALUATED = ("det_F", "pressure", "fibre_stretch", "fibre_stress", "von_mises")
 _CORNERS = np.eye(4)
-# The statistic of the maximum distance to the reference, by the name of its error bar.
+# The name of each array of error bars, and the statistic whose error bar the array contains.
 _BARS = {"error_bar": "max", "error_bar_of_surface": "hausdorff"}
 
 
 def write(comparison: Comparison, folder: Path) -> list[str]:
-    """Write the runs of a muscle into a free ``folder``, completely or not at all, and return the file names; else InputError."""
+    """Write all runs of a muscle into ``folder`` and return the names of the written files.
+
+    Raises InputError unless the folder is missing or empty. If writing fails, no partly written folder is left behind.
+    """
     case = casefile.muscle(comparison.scene)
     with new_folder(folder) as part:
         frames = _Frames(comparison)
@@ -64,7 +69,7 @@ def write(comparison: Comparison, folder: Path) -> list[str]:
 
 
 class _Frames:
-    """The blocks of every frame of a comparison, with their common data."""
+    """The blocks of every frame of a comparison, and the data that all frames share."""
 
     def __init__(self, comparison: Comparison) -> None:
         assert isinstance(comparison.context, MeasurementContext)  # the comparison is of a muscle
@@ -73,14 +78,14 @@ class _Frames:
         self.results, self.within = _states(comparison), None
         if self.results is not None:
             found = embed(self.results.mesh, self.setup.surface.points)
-            # A vertex outside the tetrahedra gets the values at their boundary.
+            # A vertex slightly outside the tetrahedra gets the values at the boundary of the nearest tetrahedron.
             inside = np.clip(found.barycentric, 0, None)
             self.within = found.tets, inside / inside.sum(axis=1, keepdims=True)
         self.arrays = {run.name: dict(self._of_surface(run)) for run in comparison.runs}
         self.fibres = {run.name: fibre_points(run, self.context) for run in comparison.runs}
 
     def _of_surface(self, run: Run) -> Iterator[tuple[str, Floats]]:
-        """Arrays (f, n) at the vertices of a run, by name."""
+        """Names and arrays (f, n) of the quantities at the n surface vertices of a run in each of its f frames."""
         if not run.has_surface:
             return
         gaps = local_fields.to_bones(run, self.context)
@@ -88,7 +93,7 @@ class _Frames:
             yield "distance_to_bones", gaps
         if run is self.reference:
             pressed = contact.among(self.case.effects) is not None and in_situ.among(self.case.effects) is None
-            # In situ the pressure depends on gaps at rest, which only the solver knows.
+            # With `in_situ` the contact pressure depends on the gaps at rest, which are known only to the solver.
             if gaps is not None and pressed:
                 yield "contact_pressure", self._contact_pressure()
             return
@@ -101,7 +106,7 @@ class _Frames:
                 yield name, np.repeat(bar.values[:, None], len(run.surface.points), axis=1)
 
     def _contact_pressure(self) -> Floats:
-        """The sum over the bones (f, n) [MPa] of the law of contact at the vertices; 0 if these are not free."""
+        """Contact pressure (f, n) [MPa] at the vertices of the reference, summed over all bones; 0 at exempt vertices."""
         effect = contact.among(self.case.effects)
         assert effect is not None  # the caller checked it
         law, run = ContactLaw("free", effect.stiffness, effect.smoothing), self.reference
@@ -116,7 +121,7 @@ class _Frames:
         return np.where(self.setup.free, pressures, 0.0)
 
     def blocks(self, i: int) -> Tree:
-        """The blocks of the frame of index ``i``."""
+        """All blocks of the frame with index ``i``."""
         number, rest = self.reference.numbers[i], self.setup.surface
         bones = {}
         for bone in self.setup.bones:
@@ -153,7 +158,11 @@ class _Frames:
 
 
 def interior(made: Results, frame: float) -> DataBlock:
-    """The tetrahedra of a reference; results that jump between them are given at the middles, the least det F at the corners."""
+    """The tetrahedra of the reference at a ``frame``.
+
+    Quantities that are discontinuous between tetrahedra are evaluated at the centroid of each tetrahedron. The array
+    ``det_F_at_worst_corner`` contains the smallest det F at the four corners.
+    """
     mesh, count = made.mesh, len(made.mesh.tets)
     cells = made.evaluate_in(np.arange(count), np.full((count, 4), 0.25), frame, _names(made, frame))
     middles = mesh.points[mesh.tets].mean(axis=1)
@@ -161,33 +170,39 @@ def interior(made: Results, frame: float) -> DataBlock:
     ends = made.evaluate_in(np.repeat(np.arange(count), 4), np.tile(_CORNERS, (count, 1)), frame, ("det_F",))
     cells["det_F_at_worst_corner"] = ends["det_F"].reshape(count, 4).min(axis=1)
     displacement = np.zeros_like(mesh.points)
-    displacement[mesh.tets] = made.states[frame].displacement[:, :4]  # the corners are the first nodes
+    displacement[mesh.tets] = made.states[frame].displacement[:, :4]  # the first four nodes are the corners
     return DataBlock(mesh.points, mesh.tets, {"displacement": displacement}, cells)
 
 
 def _names(made: Results, frame: float) -> list[str]:
-    """The arrays of a frame that are written, in addition to displacement."""
+    """The names of the arrays at a ``frame`` that are written in addition to the displacement."""
     return [name for name in made.names(made.states[frame]) if name in _EVALUATED]
 
 
 def _states(comparison: Comparison) -> Results | None:
-    """The results of the reference, None if it keeps no states."""
+    """The results computed from the stored states of the reference; None if no states are stored."""
     run = comparison.reference
     folder = run.folder
     if folder is None or not states.are_kept(folder, run.numbers):
-        log.info("%s keeps no states: stress, pressure, det F and fibre stretch are left out", run.name)
+        log.info("%s has no stored states: stress, pressure, det F and fibre stretch are omitted", run.name)
         return None
     return results.of_run(folder, comparison.scene)
 
 
 def _moved(rest: Floats, now: Floats) -> dict[str, Floats]:
-    """The displacement of points at ``rest``; 0 for points without a position, so that they can be drawn."""
+    """The array ``displacement`` (n, 3) [mm] from ``rest`` (n, 3) to ``now`` (n, 3), for :class:`DataBlock`.
+
+    A point with an unknown position has the displacement 0, so that ParaView can draw it.
+    """
     known = np.isfinite(now)
     return {"displacement": np.where(known, now - np.where(known, rest, 0.0), 0.0)}
 
 
 def _part(rest: Surface, vertices: Ints, now: Floats) -> DataBlock:
-    """The triangles of a surface with all corners among ``vertices``, if any, and only these vertices."""
+    """The part of the surface ``rest`` with only the given ``vertices``, and the triangles whose corners all belong to them.
+
+    ``now`` (n, 3): present positions of all vertices of the surface [mm].
+    """
     chosen = rest.triangles[np.isin(rest.triangles, vertices).all(axis=1)]
     own = np.unique(vertices)
     return DataBlock(rest.points[own], np.searchsorted(own, chosen), _moved(rest.points[own], now[own]))

@@ -1,4 +1,4 @@
-"""The part of a surface that is exempt from contact: attached parts, and parts near them on the same side."""
+"""The part of a muscle's surface that is exempt from contact: the attachments, and a strip around each attachment."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,16 +13,20 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, corne
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.skins import Pieces, Skin, cut, embedded, points, spacing
 
-# A part that faces more than 120 degrees away from an attached part is on the other side of a thin body.
+# The cosine of 120 degrees. If the normals at a point and at the attached part enclose a larger angle, the point is on the other
+# side of a thin body.
 _SAME_SIDE = -0.5
-# Corners are sampled at this fraction of the way to the middle of their piece, so that a point on an edge belongs to one side.
+# The distance of a corner is sampled slightly inside the piece, at this fraction of the way from the corner to the centroid.
+# So a corner on a sharp edge is sampled on the face of its own piece.
 _INWARD = 1e-3
 
 
 class Corners(NamedTuple):
-    """The distinct corners (k,) of the pieces of a surface. The matrix ``carried`` (k, n) maps positions of vertices to positions
-    of corners; ``away`` (k,) [mm] is the distance from the attached part, 0 on it, and ``by`` (k,) the index of its attachment.
-    ``at`` (p, 3) are the corners of each piece, and ``vertices`` (n,) the corner at each vertex.
+    """The k distinct corners of the p pieces into which a surface with n vertices is cut.
+
+    ``carried`` (k, n): matrix that maps the positions of the vertices to the positions of the corners. ``away`` (k,) [mm]: distance
+    of each corner from the attached part, 0 on the attached part. ``by`` (k,): index of the attachment that is nearest to each
+    corner. ``at`` (p, 3): indices of the three corners of each piece. ``vertices`` (n,): index of the corner at each vertex.
     """
 
     carried: csr_array
@@ -34,11 +38,14 @@ class Corners(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Exemption:
-    """The part of a ``surface`` that is exempt from contact: the triangles of the attached ``part`` (r, 3, 3), and the surface
-    within ``reach`` [mm] of them on the same side. ``by`` (r,): the index of each triangle's attachment; ``names``: their bones.
+    """The part of a ``surface`` that is exempt from contact: the attached part, and the surface within ``reach`` [mm] of the
+    attached part on the same side of the body.
 
-    The reach is the ``spacing`` of the contact points: the area of a point closer to the attached part would include attached
-    area. The reach depends on the size of the surface and not on its triangles.
+    ``part`` (r, 3, 3) [mm]: corners of the triangles of the attached part. ``by`` (r,): index of the attachment to which each of
+    these triangles belongs. ``names``: for each attachment, the name of its bone.
+
+    The reach equals the ``spacing`` of contact points, because the area that belongs to a contact point closer to the attached part
+    would include attached area. The reach depends on the size of the surface and not on its triangulation.
     """
 
     surface: Surface
@@ -49,8 +56,9 @@ class Exemption:
 
     @classmethod
     def of(cls, surface: Surface, attached: Iterable[tuple[str, Floats]] = ()) -> "Exemption":
-        """The exemption of a surface. ``attached``: for each attachment, the name of the bone and, for each corner of the triangles
-        (m, 3), 1 if attached and 0 if not. The attached part is where their linear interpolation is at least 1/2.
+        """The exemption of a ``surface`` with m triangles. ``attached``: for each attachment, the name of its bone and an array
+        (m, 3) that is 1 at the corners of triangles that are attached and 0 at all others. The attached part is where the linear
+        interpolation of these values is at least 1/2.
         """
         names, shares = zip(*attached, strict=True) if (attached := tuple(attached)) else ((), ())
         quarters = Pieces.whole(np.arange(len(surface.triangles))).quartered()
@@ -60,8 +68,10 @@ class Exemption:
         return cls(surface, corners[np.concatenate([np.zeros(0, np.int64), *some])], by, names, spacing(surface))
 
     def away(self, triangles: Ints, points: Floats) -> tuple[Floats, Ints]:
-        """Distances (k,) [mm] of ``points`` (k, 3) of the ``triangles`` (k,) from the attached part, infinite if the part faces
-        away, and the index (k,) of its attachment.
+        """Distances (k,) [mm] of surface points from the attached part, and the index (k,) of the nearest attachment.
+
+        ``points`` (k, 3) [mm]: the points. ``triangles`` (k,): index of the triangle in which each point lies. The distance is
+        infinite if the nearest attached triangle is on the other side of the body. Without an attached part all indices are -1.
         """
         if len(self.part) == 0:
             return np.full(len(points), np.inf), np.full(len(points), -1)
@@ -73,12 +83,12 @@ class Exemption:
 
     @cached_property
     def pieces(self) -> Pieces:
-        """The entire surface, cut into pieces of the spacing of contact points."""
+        """The entire surface, cut into pieces whose mean edge length is at most the spacing of contact points."""
         return cut(self.surface, np.arange(len(self.surface.triangles)), self.reach)
 
     @cached_property
     def corners(self) -> Corners:
-        """The corners of the pieces, each with its least distance from the attached part over all pieces."""
+        """The corners of the pieces. The distance of a corner is the minimum over all pieces that share the corner."""
         triangles, pieces, count = self.surface.triangles, self.pieces, len(self.surface.points)
         weights = pieces.corners.reshape(-1, 3)
         named = np.where(weights > 0, np.repeat(triangles[pieces.parents], 3, axis=0), count)
@@ -90,7 +100,7 @@ class Exemption:
         carried = csr_array((shares[row, column], (row, names[row, column])), shape=(len(different), count))
         inward = self._places + _INWARD * (self._places.mean(axis=1, keepdims=True) - self._places)
         away, by = self.away(np.repeat(self.pieces.parents, 3), inward.reshape(-1, 3))
-        away = np.where(away > _INWARD / 10 * self.reach, away, 0.0)  # 0 on the attached part
+        away = np.where(away > _INWARD / 10 * self.reach, away, 0.0)  # exactly 0 on the attached part
         nearest = np.lexsort((away, at))
         nearest = nearest[np.unique(at[nearest], return_index=True)[1]]
         single = np.flatnonzero(names[:, 1] == count)
@@ -99,34 +109,40 @@ class Exemption:
 
     @property
     def vertices(self) -> NDArray[np.bool_]:
-        """Mask (n,) of the vertices that are exempt in any triangle around them."""
+        """Mask (n,) of the exempt vertices. A vertex is exempt if it is exempt as a corner of any triangle around it."""
         return np.asarray(self.corners.away[self.corners.vertices] <= self.reach)
 
     @cached_property
     def felt(self) -> NDArray[np.bool_]:
-        """Mask (p,) of the pieces whose middle can be in contact."""
+        """Mask (p,) of the pieces whose centroid can be in contact."""
         return np.asarray(self.away(self.pieces.parents, self._places.mean(axis=1))[0] > self.reach)
 
     def places(self, count: int) -> csr_array:
-        """A matrix from positions of vertices to those of about ``count`` evenly chosen points that can be in contact."""
+        """Sparse matrix (s, n) that maps the positions of the n vertices to the positions of s points that can be in contact.
+
+        The points are corners of pieces, chosen at regular intervals so that s is about ``count``.
+        """
         felt = np.flatnonzero(self.corners.away > self.reach)
         return self.corners.carried[felt[:: max(1, len(felt) // count)]]
 
     @cached_property
     def lost(self) -> float:
-        """The fraction of the unattached surface that is exempt from contact; 1 if all is attached."""
+        """The fraction of the unattached surface area that is exempt from contact; 1 if the entire surface is attached."""
         areas = corner_areas(self._places)
         loose = areas.sum() - corner_areas(self.part).sum()
         return float(1 - areas[self.felt].sum() / loose) if loose > 0 else 1.0
 
     @cached_property
     def _places(self) -> Floats:
-        """The corners (p, 3, 3) of the pieces at rest."""
+        """Rest positions (p, 3, 3) [mm] of the corners of the pieces."""
         return self.pieces.of(self.surface.points[self.surface.triangles])
 
 
 def _distinct(rows: Floats) -> tuple[Floats, Ints]:
-    """The distinct ``rows`` (k, d), sorted, and the index (n,) of each row among them: seven times as fast as ``np.unique``."""
+    """The sorted distinct rows (k, d) of ``rows`` (n, d), and the index (n,) of each row in this sorted array.
+
+    This is seven times as fast as ``np.unique``.
+    """
     order = np.lexsort(rows.T[::-1])
     first = np.append(True, (np.diff(rows[order], axis=0) != 0).any(axis=1))
     number = np.empty(len(rows), np.int64)
@@ -135,7 +151,10 @@ def _distinct(rows: Floats) -> tuple[Floats, Ints]:
 
 
 def free_skin(exempt: Exemption, mesh: TetMesh, apart: float) -> Skin:
-    """The material points in a ``mesh`` that can be in contact (not ``exempt``), on average at most ``apart`` [mm] apart."""
+    """The material points of a surface that can be in contact, embedded in a ``mesh``.
+
+    ``exempt``: the surface and its exempt part. ``apart``: maximum mean distance between neighbouring points [mm].
+    """
     surface = exempt.surface
     pieces = cut(surface, np.arange(len(surface.triangles)), apart)
     places, areas = points(pieces.of(surface.points[surface.triangles]), np.ones(pieces.corners.shape[:2]))

@@ -1,6 +1,7 @@
-"""Lengths of the edges of a run's surface, compared with the reference, in per cent of their rest length.
+"""Lengths of the edges of the surface in a run, compared with the reference, in per cent of the rest length of each edge.
 
-Against rest this is the edge extension of the report (l / L of Figs 6.15 to 6.17) minus one.
+If the surface is compared with the rest state instead, the values are the edge extension of the report (l / L of Figs 6.15 to 6.17)
+minus one.
 """
 
 import numpy as np
@@ -22,11 +23,11 @@ OF, AGAINST = "surface", "reference"
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """Statistics over the edges of ``(l - l_reference) / L`` [%], L the length at rest: the signed ``mean`` and the ``rms``; for
-    the magnitude the 95th percentile (``p95``) and the greatest (``max``).
+    """Statistics of the deviation ``(l - l_reference) / L`` [%] over all edges, where L is the length of an edge at rest.
 
-    An edge is weighted by the area around it at rest, a third of its two triangles. In ``mean_of_edges`` all edges have the same
-    weight, as in the report.
+    ``mean``: the signed mean. ``rms``: the root mean square. ``p95`` and ``max``: the 95th percentile and the maximum of the
+    magnitude. The weight of an edge is its area at rest, a third of the area of the two adjacent triangles; ``max`` has no weights.
+    ``mean_of_edges``: the signed mean with the same weight for every edge, as in the report.
     """
     edges = Edges.of(reference.surface)
     lengths, wanted = (np.array([edges.lengths(points) for points in each.positions]) for each in (run, reference))
@@ -35,7 +36,11 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
 
 def over_edges(name: str, deviations: Floats, edges: Edges, reference: Run, **more: Floats) -> tuple[Measure, ...]:
-    """The measures ``name`` from ``deviations`` (f, e) by edge and ``more`` (f,); the worst point: the edge that deviates most."""
+    """The measures of the metric ``name``, computed from the deviation of each edge. The worst place of a frame is the edge that
+    deviates most.
+
+    ``deviations`` (f, e): deviation of each of the e edges in each of the f frames. ``more``: values (f,) of further statistics.
+    """
     size = np.abs(deviations)
     values = {
         "mean": deviations @ edges.areas / edges.areas.sum(),

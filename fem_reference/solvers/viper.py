@@ -1,13 +1,15 @@
-"""VIPER: a muscle as a bundle of rods that have volume, bend and twist, by position based dynamics.
+"""VIPER: a muscle as a bundle of volume-preserving rods, simulated by position based dynamics.
 
-Angles et al. (2019), doi:10.1145/3340260: a rod has points, each with a radius, and segments, each with a frame. It resists stretch
-and shear, bend and twist (Kugelstadt and Schoemer 2016), and its segments keep their volume: the radii shrink where the rod is
-stretched. Shape matching ties the rods of a bundle; its scale also scales the radii. The surface moves with the rods.
+The method is that of Angles et al. (2019), doi:10.1145/3340260. A rod consists of points, each with a radius, and of segments, each
+with a frame. A rod resists stretch, shear, bending and twist (Kugelstadt and Schoemer 2016). Each segment keeps its volume, so the
+radii shrink where the rod is stretched. Shape matching couples the rods of a bundle: it fits a rotation and a scale to each group
+of neighbouring points, and the scale also applies to their radii. The surface of the muscle moves with the rods.
 
-Each fibre of the case is a rod. For bend and twist, the bones nearest to its ends act like neighbouring segments. There is neither
-mass nor time: a frame number begins with the previous state, moved by a blend of the bones' motions. A stiffness is a factor on the
-corrections of a sweep, as in ``pbd``, so the result depends on ``iterations``. All rods have the same radius at rest, chosen so
-that they fill the muscle's volume. Only rods keep their volume; the volume inside the surface may change.
+Here each fibre of the case is a rod. In the constraints on bending and twist, the bone nearest to each end of a rod acts like a
+neighbouring segment. The solver is quasi-static and has no mass: each frame number starts from the previous state, moved by a
+blend of the motions of these two bones. A stiffness is a factor on the corrections of a sweep, as in ``pbd``, so the result depends
+on ``iterations``. All rods have the same radius at rest, chosen so that the rods together have the volume of the muscle. Only the
+rods keep their volume; the volume enclosed by the surface may change.
 """
 
 from typing import Annotated
@@ -30,14 +32,16 @@ from fem_reference.solvers.common.lines import along, nearest_bones
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import Stiffness
 
-# The number of neighbours of a rod in its bundle, and the number of rod points with which a vertex moves.
+# The number of nearest points in a cross-section that form a group for shape matching, including the point itself, and the number
+# of rod points that determine the motion of a vertex of the surface.
 _AROUND, _CARRIERS = 6, 12
 
 
 class ViperSettings(Record):
-    """``points``: the number per rod. ``iterations``: sweeps over all constraints for each frame number. ``stretch``, ``bending``,
-    ``volume``, ``bundle``: the stiffness of each kind of constraint in a sweep, from 0 (off) to 1. ``contact`` (default off): rods
-    keep at least their radius, or the distance at rest if less, away from bones, and the surface is moved out of bones.
+    """``points``: number of points of each rod. ``iterations``: number of sweeps over all constraints for each frame number.
+    ``stretch``, ``bending``, ``volume``, ``bundle``: stiffness of each kind of constraint in a sweep, from 0 (off) to 1.
+    ``contact``: if true, each point of a rod stays away from bones by the rod radius (or by its distance at rest, if that is less),
+    and the surface is moved out of bones. The default is false.
     """
 
     points: Annotated[int, Field(ge=4, le=1000), Trade((4, 6, 12))]
@@ -50,10 +54,13 @@ class ViperSettings(Record):
 
 
 class Bundle:
-    """Rods at ``rest`` (k, p, 3) [mm] of one ``radius``. A section has one point of each rod; neighbours in it form groups.
+    """Shape matching of the k rods of a bundle, each with p points.
 
-    Each group, a point and its neighbours, has a rotation and a scale, fitted to points, radii and frames by least squares; the
-    goal of a point is the mean over its groups.
+    ``rest`` (k, p, 3) [mm]: points of the rods at rest. ``radius`` [mm]: radius of all rods at rest.
+
+    A cross-section of the bundle contains one point of each rod. In a cross-section, each point and its nearest neighbours form a
+    group. A rotation and a scale are fitted to the points, radii and frames of each group by least squares. The goal position of a
+    point is the weighted mean over all groups that contain the point.
     """
 
     def __init__(self, rest: Floats, radius: float) -> None:
@@ -66,7 +73,10 @@ class Bundle:
         self.sizes = sizes[..., 0] - np.sum(self.means**2, axis=2)
 
     def goals(self, points: Floats, radii: Floats, frames: Floats) -> tuple[Floats, Floats]:
-        """The goals (k, p, 3) of ``points`` and (k, p) of ``radii`` [mm], for the present ``frames`` (k, p, 3, 3)."""
+        """Goals (k, p, 3) of the points and goals (k, p) of the radii [mm].
+
+        ``points`` (k, p, 3) and ``radii`` (k, p): present state [mm]. ``frames`` (k, p, 3, 3): present rotation at each point.
+        """
         now = (points - self.middle).swapaxes(0, 1)
         parts = now[..., None] * self.sections[..., None, :]
         parts += (self.radius * radii.T)[..., None, None] * frames.swapaxes(0, 1)
@@ -84,7 +94,7 @@ class Bundle:
 
 
 class Rods(MovingSurface):
-    """A muscle as ``rods`` (k, p, 3) [mm], with which its surface moves."""
+    """A muscle as k rods with p points each, and a surface that moves with them. ``rods`` (k, p, 3): present points [mm]."""
 
     advice = "a slower motion, more iterations, or contact = false, may help"
 
@@ -116,7 +126,7 @@ class Rods(MovingSurface):
         self.cost["unknowns"] = float(len(rest) * (4 * free + 3 * (free + 1) + 2))
 
     def move(self, number: int) -> None:
-        """Move the rods to frame ``number``, and the surface and fibres with them."""
+        """Advance the rods, the surface and the fibres to frame ``number``."""
         self._begin(number)
         for bone in (*self.bones, *self.skin_bones):
             bone.move(number)
@@ -126,7 +136,9 @@ class Rods(MovingSurface):
         self._carry(number)
 
     def _begin(self, number: int) -> None:
-        """Move rods by a blend of the motions of the bones at their ends, and the end points exactly with these bones."""
+        """Initial guess for frame ``number``: each rod moves by a blend of the motions of the two bones at its ends. The end points
+        of the rod move exactly with these bones.
+        """
         share, between = (np.linspace(0, 1, self.settings.points + i)[:, None] for i in (0, 1))
         first, last = (self._moved(ends, number) for ends in self.ends)
         self.rods = (1 - share) * first[0] + share * last[0]
@@ -136,7 +148,10 @@ class Rods(MovingSurface):
         self.last = number
 
     def _moved(self, ends: Ints, number: int) -> tuple[Floats, Floats]:
-        """Points and turns of rods that move from the last frame number with the bones at one of their ends, ``ends`` (k,)."""
+        """Points and rotations of the rods if each rod moved rigidly with one bone from the last frame number to ``number``.
+
+        ``ends`` (k,): the index of this bone for each rod.
+        """
         points, turns = np.empty_like(self.rods), np.empty_like(self.turns)
         for n in np.unique(ends):
             bone = self.problem.bones[n]
@@ -157,13 +172,13 @@ class Rods(MovingSurface):
         move_out(self.rods.reshape(-1, 3), self.bones, 1.0)
 
     def _frames(self) -> Floats:
-        """The rotation (k, p, 3, 3) at each point, halfway between the rotations of its segments."""
+        """Rotation (k, p, 3, 3) at each point, halfway between the rotations of the two adjacent segments."""
         before, after = self.turns[:, :-1], self.turns[:, 1:]
         sign = np.where(np.sum(before * after, axis=2, keepdims=True) < 0, -1.0, 1.0)
         return kernels.matrices(kernels.unit(before + sign * after))
 
     def _carry(self, number: int) -> None:
-        """Move surface and fibres with the rods; each point of a rod rotates and scales its surroundings."""
+        """Move the surface and the fibres with the rods. Each point of a rod rotates and scales its surroundings."""
         maps = (self.radii / self.radius)[..., None, None] * self._frames()
         shifts = self.rods - np.einsum("kpij,kpj->kpi", maps, self.rest)
         parts = np.concatenate([maps.reshape(-1, 9), shifts.reshape(-1, 3)], axis=1)
@@ -173,23 +188,27 @@ class Rods(MovingSurface):
         move_out(self.points, self.skin_bones, 1.0)
 
     def frame(self, number: int) -> Frame:
-        """Surface and fibres; scalars: the minimum and maximum over all segments of the ratio of volume to volume at rest."""
+        """Surface and fibres at frame ``number``, and as scalars the minimum and maximum of V/V0 over all segments of rods."""
         ratio = kernels.volumes(self.rods, self.radii) / self.volumes
         scalars = {"rod_volume_min": float(ratio.min()), "rod_volume_max": float(ratio.max())}
         return Frame(number, self.points.copy(), self.fibres.copy(), scalars=scalars)
 
     def ending(self) -> Outcome:
-        """Converged, as no iteration fails."""
+        """The outcome "converged": a fixed number of iterations cannot fail to converge."""
         count, points = self.rest.shape[:2]
-        return Outcome("converged", f"{count} rods of {points} points, of {self.radius:.3g} mm radius at rest")
+        return Outcome("converged", f"{count} rods with {points} points each and a rest radius of {self.radius:.3g} mm")
 
 
 def shares(points: Floats, carriers: Floats, count: int) -> csr_array:
-    """Weights (n, m) of the ``count`` nearest ``carriers`` (m, 3) at ``points`` (n, 3), which fall to 0 at the next nearest."""
+    """Sparse matrix (n, m) of the weights of m ``carriers`` (m, 3) at n ``points`` (n, 3); each row sums to 1.
+
+    Only the ``count`` carriers nearest to a point have a weight. The weight decreases with the distance and reaches 0 at the
+    distance of the next nearest carrier.
+    """
     asked = min(count + 1, len(carriers))
     away, near = (found.reshape(len(points), asked) for found in cKDTree(carriers).query(points, k=asked))
     reach = away[:, -1:] * (1 if asked > count else 2) + np.finfo(float).tiny
-    # If all are equally near, all get the same weight.
+    # The small constant gives equal weights to carriers that are all at the same distance; their weights would otherwise all be 0.
     weights = (1 - (away / reach) ** 2) ** 2 + 1e-12
     weights /= weights.sum(axis=1, keepdims=True)
     rows = np.repeat(np.arange(len(points)), asked)
@@ -197,7 +216,11 @@ def shares(points: Floats, carriers: Floats, count: int) -> csr_array:
 
 
 def _along_rods(lines: list[Floats], count: int) -> csr_array:
-    """Weights (n, k * count) of rod points at the points of ``lines``, nonzero for both ends of the segment with the point."""
+    """Sparse matrix (n, k * count) of the weights of rod points at the n points of k fibres.
+
+    ``lines``: points of each fibre. ``count``: number of points of each rod. A point of a fibre has linear weights for the two rod
+    points between which it lies.
+    """
     shares_of = []
     for line in lines:
         travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
@@ -207,12 +230,15 @@ def _along_rods(lines: list[Floats], count: int) -> csr_array:
 
 
 def _carried(rest: Floats, parts: Floats) -> Floats:
-    """Points at ``rest`` (n, 3) [mm], each moved by a linear map and a shift: its row of ``parts`` (n, 12)."""
+    """Present positions (n, 3) [mm] of the points ``rest`` (n, 3) [mm].
+
+    ``parts`` (n, 12): for each point the linear map (nine entries, row by row) and the translation (three entries) that move it.
+    """
     return np.asarray(np.einsum("nij,nj->ni", parts[:, :9].reshape(-1, 3, 3), rest) + parts[:, 9:])
 
 
 def solve(problem: MuscleProblem, settings: ViperSettings, sink: Sink) -> Outcome:
-    """Compute the rods at every frame number."""
+    """Solve a muscle with VIPER through every frame number."""
     return follow(Rods(problem, settings), problem, sink)
 
 

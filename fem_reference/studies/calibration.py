@@ -1,4 +1,4 @@
-"""Calibration: fit of the parameters of a case to measured forces, lengths and positions, by runs of its reference."""
+"""Calibration: fit the parameters of a case to measured forces, lengths and positions by solving the case with FEniCSx."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -32,12 +32,14 @@ _WANT = "METRIC.STATISTIC, force.BONE, force.BONE.x, or position.VERTEX.x"
 def calibrate_case(
     case: Case, data: str | Path, fit: Sequence[str], *, store: str | Path = STORE, progress: Progress | None = None
 ) -> Calibration:
-    """Fit numbers of the case of a muscle to measurements, by runs of its reference on the mesh of the case.
+    """Fit parameters of a muscle case to measurements. Each trial solves the reference on the mesh of the case.
 
-    ``data``: a CSV file with the columns ``frame,quantity,value,unit,sd``, as the page on unknown parameters describes them;
-    ``fit``: keys of numbers that have a range, such as ``"effect[0].mu"``. The result has ``estimates``, each with its
-    ``parameter``, ``value`` and confidence interval from ``low`` to ``high`` in the unit of the parameter, and ``holds``: True
-    if the fit converged, the law fits the data, and all numbers are determined.
+    ``data``: path of a CSV file with the columns ``frame,quantity,value,unit,sd``; the page on unknown parameters describes them.
+    ``fit``: the keys of the parameters to fit, such as ``"effect[0].mu"``. Each parameter must have a range.
+
+    The returned ``Calibration`` has one entry in ``estimates`` for each parameter: the ``parameter``, the fitted ``value`` and the
+    confidence interval from ``low`` to ``high``, in the unit of the parameter. Its property ``holds`` is True if the fit converged,
+    the law fits the data, and every parameter is determined and inside its range.
     """
     muscle = casefile.muscle(arguments.check_case(case))
     keys, folder = arguments.check_keys(fit), arguments.free_folder(store, "store")
@@ -46,13 +48,13 @@ def calibrate_case(
 
 
 def calibrate(case: MuscleCase, data: Path, keys: Sequence[str], store: Path, workers: Workers) -> Calibration:
-    """The numbers of a case at ``keys``, within their ranges, fitted to the measurements in a CSV file by runs of the reference."""
+    """Fit the parameters at ``keys``, each within its range, to the measurements in the CSV file ``data``."""
     varied = unknowns(case.model_copy(update={"candidate": ()}))
     case, parameters, lost = varied.case, chosen(varied, keys), list[Failure]()
     rows = calibration.read(data, lambda quantity, place: unit_of(case, quantity, place))
     for row in rows:
         if row.frame not in case.numbers:
-            want = f"one of the case: {case.numbers[0]} to {case.numbers[-1]}, every {case.frames.every}"
+            want = f"a frame of the case: {case.numbers[0]} to {case.numbers[-1]}, every {case.frames.every}"
             raise InputError(f"{row.place}: frame", str(row.frame), want)
 
     def forward(points: Sequence[Floats]) -> list[Floats | None]:
@@ -67,15 +69,17 @@ def calibrate(case: MuscleCase, data: Path, keys: Sequence[str], store: Path, wo
 
 
 def chosen(varied: Unknowns, keys: Sequence[str]) -> tuple[Parameter, ...]:
-    """The parameters at ``keys``; InputError if one has no range, or belongs to an effect that the case leaves out."""
+    """The parameters at ``keys``, each once. Raises InputError if there are no keys, if a parameter has no range, or if a parameter
+    belongs to an effect that the case leaves out.
+    """
     known = {one.key: one for one in varied.parameters()}
     for key in keys:
         numbers.number(varied.whole, key)
         if not varied.acts(key):
-            got = f'"{key}", of {numbers.title(varied.whole, key)}, which this case leaves out'
-            raise InputError("--fit", got, f'one of {", ".join(known)}, or effects = "listed"')
+            got = f'"{key}" ({numbers.title(varied.whole, key)}), a parameter of an effect that this case leaves out'
+            raise InputError("--fit", got, f'one of {", ".join(known)}, or effects = "listed" in the case')
         if numbers.canonical(key) not in known:
-            want = f"a key with a range ({', '.join(known)}), or one in [[uncertain]] of the case"
+            want = f"a key with a range ({', '.join(known)}), or a range for this key in [[uncertain]] of the case"
             raise InputError("--fit", f'"{key}", which has no range', want)
     if not keys:
         raise InputError("--fit", "nothing", f"one of {', '.join(known)}")
@@ -83,24 +87,24 @@ def chosen(varied: Unknowns, keys: Sequence[str]) -> tuple[Parameter, ...]:
 
 
 def unit_of(case: MuscleCase, quantity: str, place: str) -> str:
-    """The unit of a quantity of the case; InputError at ``place`` if the case has no such quantity."""
+    """The unit of a measured ``quantity``. Raises an InputError that names ``place`` if the case has no such quantity."""
     kind, name, axis = _split(quantity)
     bones = [bone.name for bone in case.bone]
     if kind == "force":
         if name in bones:
             return "N"
-        raise InputError(place, f'"{quantity}"', f"force.BONE or force.BONE.x, of one of {', '.join(bones)}")
+        raise InputError(place, f'"{quantity}"', f"force.BONE or force.BONE.x, where BONE is one of {', '.join(bones)}")
     if kind == "position" and name.isdecimal() and axis:
         return "mm"
     known = units(of={"surface", "lines"}, against={"reference"})
     if quantity not in known:
         metrics = ", ".join(sorted({one.partition(".")[0] for one in known}))
-        raise InputError(place, f'"{quantity}"', f"{_WANT}; metrics are {metrics}")
+        raise InputError(place, f'"{quantity}"', f"{_WANT}; the metrics are {metrics}")
     return known[quantity]
 
 
 def _split(quantity: str) -> tuple[str, str, str]:
-    """The kind of a quantity, its name, and its axis, empty if it has none.
+    """The three parts of a quantity: kind, name and axis. The axis is an empty string if the quantity has none.
 
     >>> _split("force.femur.x"), _split("force.femur"), _split("fibre_length.mean")
     (('force', 'femur', 'x'), ('force', 'femur', ''), ('fibre_length', 'mean', ''))
@@ -111,7 +115,7 @@ def _split(quantity: str) -> tuple[str, str, str]:
 
 
 def _made(varied: Unknowns, values: Sequence[dict[str, float]], store: Path, workers: Workers) -> list[Run | Failure]:
-    """The runs of the case with other ``values`` by key; a ``Failure`` for each without a result."""
+    """One run of the case for each set of parameter ``values``, given by key; a ``Failure`` in place of a run without a result."""
     found, trials = dict[int, Run | Failure](), dict[int, Trial]()
     for i, one in enumerate(values):
         said = ", ".join(f"{key} {value:.6g}" for key, value in one.items())
@@ -125,14 +129,17 @@ def _made(varied: Unknowns, values: Sequence[dict[str, float]], store: Path, wor
 
 
 def _values(case: MuscleCase, run: Run, rows: Sequence[Measurement], store: Path) -> Floats:
-    """The values (m,) of a ``run`` for the measured ``rows``."""
+    """The values (m,) that a ``run`` predicts for the m measurements in ``rows``."""
     context = context_of(shared_bench(case, store).setup(), run)
     changes = change(run, context, sorted({row.quantity.partition(".")[0] for row in rows} - {"force", "position"}))
     return np.array([_value(run, row, changes) for row in rows])
 
 
 def _value(run: Run, row: Measurement, changes: Sequence[Measure]) -> float:
-    """The value of a ``run`` at the frame of a ``row``; a statistic is taken from its ``changes`` from rest."""
+    """The value that a ``run`` predicts for the measurement ``row``.
+
+    ``changes``: the measures of the change of the run from rest, from which the statistic of a metric is taken.
+    """
     kind, name, axis = _split(row.quantity)
     i = run.numbers.index(row.frame)
     if kind == "force":
@@ -145,5 +152,5 @@ def _value(run: Run, row: Measurement, changes: Sequence[Measure]) -> float:
         return float(run.positions[i, int(name), _AXES.index(axis)])
     measure = find(changes, kind, name)
     if measure is None:
-        raise InputError(f"{row.place}: quantity", f'"{row.quantity}"', "one that this case has")
+        raise InputError(f"{row.place}: quantity", f'"{row.quantity}"', "a quantity that this case has")
     return float(measure.values[i])

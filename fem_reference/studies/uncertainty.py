@@ -107,9 +107,9 @@ def _rows(found: Sequence[Floats], like: Floats) -> Floats:
 
 
 def _surface(comparison: Comparison, context: MeasurementContext, design: Design, runs: Sequence[Run]) -> Band:
-    """The band of the distance of the surface from that of the case, root mean square over the area."""
+    """The band of the distance of the surface from the nominal result, root mean square over the area."""
     reference, bars = comparison.reference, comparison.error_bars
-    title, frames = "Distance of the surface from that of the case, rms", len(reference.numbers)
+    title, frames = "Distance of the surface from the nominal result, rms", len(reference.numbers)
     empty = _empty(comparison, ".".join(SURFACE), title, described()[SURFACE].unit, np.zeros(frames))
     bar = None if bars is None else bars.find("deviation", *SURFACE)
     weights = np.sqrt(context.areas / context.areas.sum())[:, None]

@@ -1,8 +1,8 @@
-"""Order of convergence at the rim of a clamped area, near which the displacement varies as the square root of the distance.
+"""Order of convergence at the rim of a clamped area, where the displacement varies as the square root of the distance from the rim.
 
-Half of the bottom of a block is clamped, so that a clamped and a free face meet at 180 degrees. The side beyond the free half
-is pulled along the bottom, by a load so small that strains are about a hundredth. The opposite side slides on a plane, so that its
-corner with the clamped half is not singular.
+Half of the bottom of a block is clamped, so that a clamped and a free face meet at an angle of 180 degrees. The side face next to
+the free half is pulled parallel to the bottom, by a load so small that strains are about 0.01. The opposite side face slides on a
+plane without friction, so that its corner with the clamped half is not singular.
 """
 
 from functools import partial
@@ -19,18 +19,26 @@ from fem_reference.verification.parts import clamped, control, find, neo_hooke, 
 ELEMENT = "Q2/Q1"
 MU, BULK = 0.01, 10.0  # [MPa]
 LOAD = 1e-4  # [MPa]
-UNIFORM, GRADED = 1.0, 0.5  # the exponent m of cell sizes h ~ r^(1 - m), r from the rim; 1 is not graded
+# The exponent m of the cell sizes: cells at the distance r from the rim have the size h ~ r^(1 - m). With 1 the mesh is uniform.
+UNIFORM, GRADED = 1.0, 0.5
 
 
 def _side(sign: float, depth: float, grading: float, unit: Floats) -> Floats:
-    """Points (n, 3) [mm] of half the block from those of the unit cube, finer near the rim x = z = 0 if ``grading`` < 1."""
+    """Map points ``unit`` (n, 3) of the unit cube to points (n, 3) [mm] of one half of the block, whose rim is at x = z = 0.
+
+    ``sign``: 1 for the half with x > 0, -1 for the half with x < 0. ``depth``: size of the block along y [mm]. ``grading``: the
+    exponent m of the cell sizes; if it is less than 1, the mesh is finer near the rim.
+    """
     x = unit[:, 0] if sign > 0 else 1 - unit[:, 0]
     power = 1 / grading
     return np.column_stack([sign * x**power, depth * unit[:, 1], unit[:, 2] ** power])
 
 
 def _halves(counts: shapes.Counts, grading: float) -> Cells:
-    """The block from (-1, 0, 0) to (1, 0.5, 1), in ``counts`` cells on each side of the rim; the left of its bottom is clamped."""
+    """The mesh of the block from (-1, 0, 0) to (1, 0.5, 1) [mm], whose bottom is clamped for x < 0.
+
+    ``counts``: numbers of cells along x, y and z in each half of the block. ``grading``: exponent of the cell sizes.
+    """
     blocks = []
     for sign in (-1.0, 1.0):
         faces = {"y0": "y0", "y1": "y1"} | ({"x0": "x0", "z0": "clamped"} if sign < 0 else {"x1": "pulled"})
@@ -39,7 +47,11 @@ def _halves(counts: shapes.Counts, grading: float) -> Cells:
 
 
 def body(level: int, grading: float, *, plane: bool) -> Body:
-    """A slice in ``plane`` strain, 4 cells a side, or a block with free ends, 3 cells a side; each ``level`` halves cell sizes."""
+    """The loaded block on a mesh of the given ``level``; each level halves the cell size of the previous level.
+
+    ``plane``: True for a slice in plane strain, which has 4 cells along x and z in each half at level 0; False for a block with
+    free faces at the ends of the rim, which has 3. ``grading``: exponent of the cell sizes.
+    """
     n = (4 if plane else 3) * 2**level
     acting = (*neo_hooke(MU, BULK), make("traction", on="pulled", force=f"{LOAD}, 0, 0 MPa", ramp=ramp()))
     fixed = (*clamped("clamped"), *sliding("x0", *(("y0", "y1") if plane else ())))
@@ -47,7 +59,10 @@ def body(level: int, grading: float, *, plane: bool) -> Body:
 
 
 def order(lab: Lab, grading: float, *, plane: bool) -> Finding:
-    """The order of convergence of the force on the clamped half, from three levels: no true value of the force is needed."""
+    """Measure the order of convergence of the force on the clamped half.
+
+    The order follows from the differences between three levels of meshes, so the exact force need not be known.
+    """
     bodies, settings = [body(level, grading, plane=plane) for level in range(3)], {"first_step": 1.0, "residual": 1e-13}
     values = [float(lab.solve(one, ELEMENT, **settings).last.forces["clamped"][0]) for one in bodies]
     first, second = abs(values[1] - values[0]), abs(values[2] - values[1])
@@ -59,10 +74,10 @@ CONTROLS = {
     UNIFORM: control("meshes graded towards the rim", grading=GRADED),
     GRADED: control("uniform meshes", grading=UNIFORM),
 }
-PLANE = "the coarsest of the three meshes has 4 cells a side; finer meshes bring the order closer to the true one by"
-ON_PLANE = "A clamped patch in plane strain: order of convergence of its force, with quadratic hexahedra,"
-ON_BLOCK = "A clamped patch on a block with free ends: order of convergence of its force, with quadratic hexahedra,"
-SPACE = "the coarsest of three meshes has 3 cells a side and one cell along the rim, whose ends add their own error"
+PLANE = "the coarsest of the three meshes has 4 cells along each side; on finer meshes the order moves towards the exact order by"
+ON_PLANE = "Clamped patch in plane strain: order of convergence of the force on the patch, for quadratic hexahedra on"
+ON_BLOCK = "Clamped patch on a block with free ends: order of convergence of the force on the patch, for quadratic hexahedra on"
+SPACE = "the coarsest of the three meshes has 3 cells along each side and one cell along the rim; the ends of the rim add an error"
 
 ENTRIES = tuple(
     Entry(
@@ -80,9 +95,9 @@ ENTRIES = tuple(
         source="validation/rims.py: Williams 1952",
     )
     for name, grading, within, title, because in (
-        ("rim_plane", UNIFORM, 0.1, f"{ON_PLANE} uniform", f"{PLANE} 0.006"),
-        ("rim_plane_graded", GRADED, 0.2, f"{ON_PLANE} graded towards the rim, h ~ r^(1/2)", f"{PLANE} 0.1"),
-        ("rim_block", UNIFORM, 0.2, f"{ON_BLOCK} uniform", SPACE),
-        ("rim_block_graded", GRADED, 0.4, f"{ON_BLOCK} graded towards the rim, h ~ r^(1/2)", SPACE),
+        ("rim_plane", UNIFORM, 0.1, f"{ON_PLANE} uniform meshes", f"{PLANE} 0.006"),
+        ("rim_plane_graded", GRADED, 0.2, f"{ON_PLANE} meshes graded towards the rim, h ~ r^(1/2)", f"{PLANE} 0.1"),
+        ("rim_block", UNIFORM, 0.2, f"{ON_BLOCK} uniform meshes", SPACE),
+        ("rim_block_graded", GRADED, 0.4, f"{ON_BLOCK} meshes graded towards the rim, h ~ r^(1/2)", SPACE),
     )
 )

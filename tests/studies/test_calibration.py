@@ -123,7 +123,7 @@ def test_quantities_have_the_units_of_the_case(case: MuscleCase) -> None:
 @pytest.mark.parametrize(
     ("quantity", "want"),
     [
-        ("force.femur", "force.BONE or force.BONE.x, of one of floor, lid"),
+        ("force.femur", "force.BONE or force.BONE.x, where BONE is one of floor, lid"),
         ("force", "force.BONE"),
         ("position.3", "METRIC.STATISTIC, force.BONE"),
         ("position.x.x", "METRIC.STATISTIC"),
@@ -144,5 +144,5 @@ def test_only_a_number_with_a_range_is_fitted(case: MuscleCase, tmp_path: Path) 
         chosen(unknowns(case), ["effect[2].bulk"])
     with pytest.raises(InputError, match=r"--fit: got nothing, want one of effect\[0\]\.mu"):
         chosen(unknowns(case), [])
-    with pytest.raises(InputError, match=r"row 2: frame: got 7, want one of the case: 0 to 20, every 5"):
+    with pytest.raises(InputError, match=r"row 2: frame: got 7, want a frame of the case: 0 to 20, every 5"):
         calibrate(case, data(tmp_path, "7,force.lid,1,N,1"), [MU], tmp_path / "runs", Workers())

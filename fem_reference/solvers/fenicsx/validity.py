@@ -1,8 +1,9 @@
-"""Checks of a state by means over cells: laws are within their ranges, and the body has not collapsed.
+"""Checks of a state by means over cells: each law is inside its range of validity, and the body has not collapsed.
 
-Means are used because the exact strain at the rim of an attachment is unbounded: det F at a vertex there may be far from 1 in a
-cell that has kept its volume. Even means of single cells may be far from 1 (0.37 and 1.9 in ``gluteus_maximus``, with a bulk
-modulus of a thousand shear moduli). In such a case a law is reported as outside its range, but the body has not collapsed.
+The checks use means over cells because the exact strain at the rim of an attachment is unbounded. Det F at a vertex on the rim may
+be far from 1 although the cell has kept its volume. Even the mean over a single cell may be far from 1: in ``gluteus_maximus``,
+with a bulk modulus of a thousand shear moduli, means are as low as 0.37 and as high as 1.9. For such a cell the check reports that
+a law is outside its range, but not that the body has collapsed.
 """
 
 from collections.abc import Callable, Iterable
@@ -23,17 +24,21 @@ from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme, le
 from fem_reference.solvers.fenicsx.forms import Form, Rule
 from fem_reference.solvers.fenicsx.meshes import geometry
 
-# A cell with less than this fraction of its rest volume has collapsed, whatever the ranges of laws: about four fifths of muscle are
-# water, which does not leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal muscle),
-# and a fifth of the volume would barely contain the solid part. A body has collapsed if collapsed cells make up more than this
-# fraction of its rest volume; those that collapse at a rim make up less, the smaller they are.
+# A cell has collapsed if less than the fraction COLLAPSED of its rest volume is left, whatever the ranges of the laws. About four
+# fifths of muscle are water, which does not leave the muscle during a motion (Ward and Lieber 2005, Density and hydration of fresh
+# and fixed human skeletal muscle), and a fifth of the volume would barely contain the solid part. A body has collapsed if collapsed
+# cells make up more than the fraction SHARE of its rest volume. Cells that collapse only at the rim of an attachment make up a
+# smaller fraction, which decreases further on finer meshes.
 COLLAPSED, SHARE = 0.2, 0.01
 _SCALARS = {"V/V0": "cell_volume_ratio", "fibre stretch": "cell_fibre_stretch"}
 
 
 @dataclass(frozen=True)
 class Outside:
-    """A ``law``, as scene files name it, outside the range of its ``limit``, with its worst value."""
+    """A law that is outside its range of validity.
+
+    ``law``: name of the law in scene files. ``limit``: the range and the measure that it limits. ``extreme``: the worst value.
+    """
 
     law: str
     limit: Limit
@@ -46,54 +51,57 @@ class Outside:
 
 
 class Ranges:
-    """The laws that were outside their ranges over the states of a run: for each law, the frames and the value that was outside."""
+    """A record of the laws that were outside their ranges during a run.
+
+    ``found``: for each law, a dictionary from the frame to a text that states the value outside the range.
+    """
 
     def __init__(self) -> None:
         self.found: dict[str, dict[float, str]] = {}
 
     def add(self, frame: float, found: Iterable[Outside]) -> None:
-        """Add the laws outside their ranges at a frame."""
+        """Record the laws that are outside their ranges at a ``frame``. Only the first value of a law at a frame is kept."""
         for one in found:
             self.found.setdefault(one.law, {}).setdefault(frame, str(one))
 
     def facts(self) -> list[Any]:
-        """The content, in the types of JSON."""
+        """The record as a list that can be written as JSON."""
         return [[law, list(states.items())] for law, states in self.found.items()]
 
     def know(self, facts: list[Any]) -> None:
-        """Restore the content from ``facts``."""
+        """Restore the record from a list that :meth:`facts` returned."""
         self.found = {law: dict(states) for law, states in facts}
 
     def __str__(self) -> str:
         firsts = [(law, len(states), *next(iter(states.items()))) for law, states in self.found.items()]
         return "".join(
-            f"; {law} is outside the range of its validity in {count} of the states reached, "
+            f"; {law} is outside its range of validity in {count} of the states reached, "
             f"first at frame {frame:g}: {one}"
             for law, count, frame, one in firsts
         )
 
 
 class Validity:
-    """The means, over each cell of a body, of the measures that its laws limit. Its methods are collective."""
+    """Checks of the cell means of V/V0 and, if a law limits it, of the fibre stretch. All MPI ranks must call each method."""
 
     def __init__(self, determinants: Determinants, form: Form, body: Body) -> None:
         self.mesh, self.cells, self.effects = determinants.mesh, determinants.cells, body.effects
         self.values: dict[str, Callable[[], Floats]] = {"V/V0": determinants.values_now}
         if any(limit.measure == "fibre stretch" for effect in body.effects for limit in effect.limits()):
-            # The expression is compiled here, by all ranks together, even ranks without cells.
+            # All ranks must compile the expression together, including ranks without cells.
             stretch, mine = compiling.expression(form.fibre_stretch, form.rule[0]), np.arange(len(self.cells))
             self.values["fibre stretch"] = lambda: np.asarray(stretch.eval(self.mesh, mine.astype(np.int32)))
         self.volumes, self.centres = volumes_and_centres(self.mesh, len(self.cells), form.rule)
         self.here = State(F=(), regions=body.shares(self.centres, self.cells))
 
     def volume_ratio(self) -> float:
-        """The ratio of the present volume of the body to its rest volume."""
+        """The present volume of the body divided by its rest volume."""
         now = self.volumes.ravel() @ self.values["V/V0"]()
         present, rest = self.mesh.comm.allreduce(np.array([now, self.volumes.sum()]), MPI.SUM)
         return float(present / rest)
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """The trouble *collapsed* if more than a negligible part of the body has lost too much volume."""
+        """The trouble *collapsed* if collapsed cells make up more than the fraction ``SHARE`` of the rest volume, else None."""
         means = self._means("V/V0")
         volumes = self.volumes.sum(axis=1)
         lost, whole = self.mesh.comm.allreduce(np.array([volumes[means < COLLAPSED].sum(), volumes.sum()]), MPI.SUM)
@@ -103,7 +111,11 @@ class Validity:
         return Trouble("collapsed", why)
 
     def examine(self, frame: float) -> tuple[dict[str, float], list[Outside]]:
-        """The extremes of the means at ``frame`` and ``outside_law``, the number of cells outside a law's range; and these laws."""
+        """Examine the state at ``frame``. Returns scalars by name, and the laws that are outside their ranges.
+
+        The scalars are the minimum and maximum over the cells of each mean, and ``outside_law``, the number of cells in which any
+        law is outside its range.
+        """
         scalars: dict[str, float] = {}
         found: list[Outside] = []
         outside = np.zeros(len(self.cells), bool)
@@ -114,7 +126,7 @@ class Validity:
             low, high = self._extreme(means), self._extreme(means, -1.0)
             scalars |= {f"min_{_SCALARS[measure]}": low.value, f"max_{_SCALARS[measure]}": high.value}
             for effect, limit in [one for one in limits if one[1].measure == measure]:
-                acts = self.here.share(region_of(effect)) > 1 / 2  # in the middle of a cell
+                acts = self.here.share(region_of(effect)) > 1 / 2  # evaluated at the centroid of each cell
                 there = np.where(acts, means, np.clip(means, limit.low, limit.high))
                 outside |= (there < limit.low) | (there > limit.high)
                 low, high = self._extreme(there), self._extreme(there, -1.0)
@@ -123,18 +135,22 @@ class Validity:
         return scalars | {"outside_law": float(self.mesh.comm.allreduce(int(outside.sum()), MPI.SUM))}, found
 
     def _means(self, measure: str) -> Floats:
-        """The means over the cells of this rank (n,)."""
+        """Mean (n,) of a ``measure`` over each of the n cells of this rank."""
         if len(self.cells) == 0:
             return np.zeros(0)
         return np.average(self.values[measure]().reshape(self.volumes.shape), axis=1, weights=self.volumes)
 
     def _extreme(self, means: Floats, sign: float = 1.0) -> Extreme:
-        """The mean with the smallest ``sign * means`` (n,) over all ranks."""
+        """The smallest of ``means`` (n,) over the cells of all ranks, or the largest if ``sign`` is -1."""
         return least(self.mesh.comm, means, self.cells, self.centres, sign=sign)
 
 
 def volumes_and_centres(msh: mesh.Mesh, count: int, rule: Rule) -> tuple[Floats, Floats]:
-    """The rest volumes (n, q) [mm3] of the points of a ``rule`` in the first ``count`` cells, and the centres (n, 3) [mm]."""
+    """Rest volumes and centroids of the first n = ``count`` cells of a mesh.
+
+    ``rule``: quadrature points and weights. The volumes (n, q) [mm3] are the parts of each cell that the rule assigns to its q
+    points; the centroids (n, 3) are in mm.
+    """
     points, weights = rule
     places, slopes = geometry(msh, points, slice(count))
     volumes = weights * np.abs(np.linalg.det(slopes))

@@ -102,9 +102,7 @@ def test_means_over_cells_are_those_of_a_homogeneous_state(element, fem_lab) -> 
     cells = 8 if ELEMENTS[element][0] == "hexahedron" else 48
     assert [state.scalars["outside_law"] for state in solved.states] == [0, 0, cells]
     law = "incompressible" if ELEMENTS[element][2] is not None else "incompressible_penalty"
-    words = (
-        f"; {law} is outside the range of its validity in 1 of the states reached, first at frame 0.59: V/V0 is 0.47"
-    )
+    words = f"; {law} is outside its range of validity in 1 of the states reached, first at frame 0.59: V/V0 is 0.47"
     assert words in solved.outcome.message
     assert solved.outcome.message.endswith(" mm, below 0.5")
 
@@ -129,7 +127,7 @@ def test_a_squeeze_to_collapse_is_no_result(frames, fem_lab) -> None:
     solved = squeezed(fem_lab, "Q1/P0", POISSON, tuple(np.linspace(1, 0.1, frames + 1).tolist()))
     # On the steep branch towards it, which folds back, Newton's method may find nothing.
     assert solved.outcome.status in ("collapsed", "diverged", "limit point")
-    assert "is outside the range of its validity" in solved.outcome.message
+    assert "is outside its range of validity" in solved.outcome.message
     assert all(state.scalars["min_cell_volume_ratio"] >= COLLAPSED for state in solved.states)
 
 
@@ -163,7 +161,7 @@ def test_a_body_that_collapses_ends_as_collapsed(element, session) -> None:
     assert ", below 0.2 beyond frame 0.41 with steps down to 0.001; in the last good state" in message
     # At frame 0.2 J is 0.512; then 0.343, 0.216, and 0.2 in the last good state.
     law = "incompressible" if ELEMENTS[element][2] is not None else "incompressible_penalty"
-    assert f"{law} is outside the range of its validity in 3 of the states reached, first at frame 0.3" in message
+    assert f"{law} is outside its range of validity in 3 of the states reached, first at frame 0.3" in message
     assert message.endswith("mm, below 0.5; try a smaller motion or a larger bulk modulus")
     with pytest.raises(ArithmeticError, match="collapsed: Newton's method converged, but"):
         _ = solved.last
@@ -194,7 +192,7 @@ def test_next_to_nothing_of_a_body_may_collapse(layer, status, session) -> None:
     body = Body(mesh, flesh, fixed, (0.0, 1.0))
     solved = session.solve(body, BodySettings(element="Q1/P0", first_step=0.1, smallest_step=1e-2, residual=1e-10))
     assert solved.outcome.status == status, solved.outcome.message
-    assert "incompressible is outside the range of its validity" in solved.outcome.message
+    assert "incompressible is outside its range of validity" in solved.outcome.message
     if status == "converged":
         assert solved.last.scalars["min_cell_volume_ratio"] == pytest.approx(0.1, abs=1e-9)
         assert solved.last.scalars["outside_law"] == 1
@@ -223,9 +221,7 @@ def test_fibres_outside_their_range_are_named(stretch, beyond, session) -> None:
     assert solved.last.scalars["min_cell_fibre_stretch"] == pytest.approx(stretch, abs=1e-9)
     assert solved.last.scalars["max_cell_fibre_stretch"] == pytest.approx(stretch, abs=1e-9)
     assert solved.last.scalars["outside_law"] == (8 if beyond else 0)
-    words = (
-        "fibre_active is outside the range of its validity in 1 of the states reached, first at frame 1: fibre stretch"
-    )
+    words = "fibre_active is outside its range of validity in 1 of the states reached, first at frame 1: fibre stretch"
     assert (words in solved.outcome.message) == bool(beyond)
     assert solved.outcome.message.endswith(beyond or "all 2 frames reached")
 
