@@ -188,7 +188,7 @@ def _fronts_rows() -> str:
             continue
         half = "more time hardly reduces the error"
         if price.factor > 1:
-            half = f"{'costs' if price.is_measured else 'would cost'} {number(price.factor, 2)} times the time"
+            half = f"{number(price.factor, 2)} times as long{'' if price.is_measured else ' (extrapolated)'}"
         rows.append((f"`{solver}`", _error_and_time(own), _error_and_time(price.nearest), _set(price.nearest), half))
     times = ("error and time with the settings of the case", "smallest error, and its time")
     return table("fronts", ("solver", *times, "setting of the smallest error", "time if the error is halved"), rows)
