@@ -125,7 +125,7 @@ def _collagen_rows() -> str:
             for (change, bar), unit in zip(found, ("mm", "mm", "%", "%"), strict=True)
         )
         rows.append((f"`{case}`", *cells))
-    return table("collagen", ("change ± its error bar", *_MOVED.values()), rows)
+    return table("collagen", ("case: change ± error bar", *_MOVED.values()), rows)
 
 
 def _omission_rows() -> str:

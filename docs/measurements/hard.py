@@ -81,9 +81,7 @@ def _hard_verdict(one: dict[str, Any]) -> str:
     if one["verdict"] == "not applicable":
         return "-"
     if one["verdict"] == "degraded":
-        return (
-            f"degraded: `{one['quantity']}` {one['value']:.2g} {one['unit']}, bound {one['bound']:g} {one['unit']}"
-        )
+        return f"degraded: `{one['quantity']}` {one['value']:.2g} {one['unit']}, bound {one['bound']:g} {one['unit']}"
     return one["verdict"] if one["verdict"] == "ok" else f"{one['verdict']}: {one['sentence'].split(';')[0]}"
 
 
@@ -132,7 +130,14 @@ def _jitters_rows() -> str:
         ended, frames, most, median = one["meshes"] or ("not measured: too long", "", "", "")
         shares = (f"{share} %" if share else "" for share in (most, median))
         rows.append((f"`{one['case'].partition('.')[2]}`", one["status"], ended, frames, *shares))
-    head = ("case", "on its own mesh", "on ten other meshes", "last frame reached", "greatest distance", "median distance")
+    head = (
+        "case",
+        "on its own mesh",
+        "on ten other meshes",
+        "last frame reached",
+        "greatest distance",
+        "median distance",
+    )
     return table("stress_jitters", head, rows)
 
 
