@@ -27,9 +27,9 @@ def _comparison_worst() -> str:
     measured = kept("hip_flexion")["measured"]
     columns = {
         ("surface_deviation", "rms"): "surface error, rms",
-        ("fibre_length", "max"): "greatest error of a fibre's length",
+        ("fibre_length", "max"): "maximum error of a fibre's length",
         ("volume", "deviation"): "volume error",
-        ("penetration", "deepest"): "greatest penetration",
+        ("penetration", "deepest"): "maximum penetration",
     }
     rows = []
     for name, cost in measured["cost"].items():
@@ -101,7 +101,7 @@ def _omissions(found: dict[str, Any]) -> Any:
 
 _MOVED = {
     "surface_deviation.rms": "surface, rms",
-    "surface_deviation.max": "surface, greatest",
+    "surface_deviation.max": "surface, maximum",
     "fibre_length.rms_percent": "fibre length, rms",
     "volume.deviation": "volume",
 }

@@ -135,7 +135,7 @@ def _jitters_rows() -> str:
         "on its own mesh",
         "on ten other meshes",
         "last frame reached",
-        "greatest distance",
+        "maximum distance",
         "median distance",
     )
     return table("stress_jitters", head, rows)
