@@ -26,10 +26,10 @@ def _comparison(found: dict[str, Any]) -> Any:
 def _comparison_worst() -> str:
     measured = kept("hip_flexion")["measured"]
     columns = {
-        ("surface_deviation", "rms"): "surface, rms",
-        ("fibre_length", "max"): "fibre with the greatest error",
-        ("volume", "deviation"): "volume",
-        ("penetration", "deepest"): "greatest penetration",
+        ("surface_deviation", "rms"): "surface error, rms",
+        ("fibre_length", "max"): "maximum error of a fibre's length",
+        ("volume", "deviation"): "volume error",
+        ("penetration", "deepest"): "maximum penetration",
     }
     rows = []
     for name, cost in measured["cost"].items():
@@ -118,7 +118,7 @@ def _omissions(found: dict[str, Any]) -> Any:
 
 _MOVED = {
     "surface_deviation.rms": "surface, rms",
-    "surface_deviation.max": "surface, greatest",
+    "surface_deviation.max": "surface, maximum",
     "fibre_length.rms_percent": "fibre length, rms",
     "volume.deviation": "volume",
 }
@@ -142,7 +142,7 @@ def _collagen_rows() -> str:
             for (change, bar), unit in zip(found, ("mm", "mm", "%", "%"), strict=True)
         )
         rows.append((f"`{case}`", *cells))
-    return table("collagen", ("change ± its error bar", *_MOVED.values()), rows)
+    return table("collagen", ("case: change ± error bar", *_MOVED.values()), rows)
 
 
 def _omission_rows() -> str:
@@ -177,10 +177,10 @@ def _study_reference() -> str:
     rows = []
     for one in kept("study")["measured"]["reference"]:
         surface, fibres = number(one[SURFACE], 2), number(one["fibre_length.rms_percent"], 2)
-        rows.append(
-            (one["setting"], f"{one['unknowns']:.0f}", f"{surface} mm", f"{fibres} %", number(one[PROCESSOR], 2))
-        )
-    return table("study", ("setting", "unknowns", "surface, rms", "fibres, rms", "processor time, s"), rows)
+        setting = one["setting"].replace("volume by a penalty", "with `incompressible_penalty`")
+        rows.append((setting, f"{one['unknowns']:.0f}", f"{surface} mm", f"{fibres} %", number(one[PROCESSOR], 2)))
+    errors = ("surface error, rms", "error of fibre lengths, rms")
+    return table("study", ("changed setting", "unknowns", *errors, "processor time, s"), rows)
 
 
 def _fronts(found: dict[str, Any]) -> Any:
@@ -205,10 +205,14 @@ def _fronts_rows() -> str:
             continue
         half = "more time hardly reduces the error"
         if price.factor > 1:
-            half = f"{'costs' if price.is_measured else 'would cost'} {number(price.factor, 2)} times the time"
-        rows.append((f"`{solver}`", _error_and_time(own), _error_and_time(price.nearest), price.nearest.label, half))
-    head = ("solver", "settings of the case", "most accurate", "setting", "half the error")
-    return table("fronts", head, rows)
+            half = f"{number(price.factor, 2)} times as long{'' if price.is_measured else ' (extrapolated)'}"
+        rows.append((f"`{solver}`", _error_and_time(own), _error_and_time(price.nearest), _set(price.nearest), half))
+    times = ("error and time with the settings of the case", "smallest error, and its time")
+    return table("fronts", ("solver", *times, "setting of the smallest error", "time if the error is halved"), rows)
+
+
+def _set(point: fronts.Point) -> str:
+    return "settings of the case" if point.is_default else point.label.replace(" times", " times those of the case")
 
 
 def _error_and_time(point: fronts.Point | None) -> str:

@@ -40,12 +40,12 @@ def _bodies_rows() -> str:
         measured = f"{number(one['truth'])} ± {number(one['within'], 2)}"
         said = _where(beside[one["name"]]), _rests(beside[one["name"]])
         rows.append((title, number(one["value"]), f"{one['ladder'][0][1]:.4g}", measured, *said))
-    coarse = "on cells twice as large, in half as many load steps"
+    coarse = "shipped material, with cells twice as large and half as many load steps"
     head = (
         "body and quantity",
         "shipped material",
         coarse,
-        "measured; for the sphere the fitted law",
+        "measured (for the sphere: fitted law)",
         "result",
         _RESTS,
     )
@@ -103,11 +103,15 @@ def _credibility_grades() -> str:
         met, models = (f"{one[kind]['met']} of {one[kind]['of']}" if one[kind]["of"] else "none" for kind in _BESIDE)
         said = (claim.compared or "nothing", met, one["differences"], one["specimens"] or "none", models)
         rows.append((one["quantity"], f"**{one['grade']}**", *said, " to ".join(one["band"]) or "not known"))
-    experiment = ("measurements reproduced", "deviation of the others", "specimens, by source")
+    experiment = (
+        "measurements reproduced",
+        "deviation of measurements not reproduced",
+        "number of specimens, by source",
+    )
     head = (
         "quantity",
         "grade",
-        "compared",
+        "what was compared",
         *experiment,
         "agreement with other models (does not count as evidence)",
         "model band",
@@ -187,7 +191,7 @@ def _credibility_sources() -> str:
             met, n = f"{sum(one['met'] for one in own)} of {len(own)}", own[0]["n"] or "not known"
             rests = " / ".join(dict.fromkeys(_recalled(one["rests_on"]) for one in own))
             rows.append((credibility_page.source(name), record.specimen, n, met, rests))
-    return table("credibility", ("source", "specimens", "n", "reproduced", "source of its numbers"), rows)
+    return table("credibility", ("source", "specimens", "n", "numbers reproduced", "origin of the numbers"), rows)
 
 
 def _credibility_arms() -> str:
@@ -213,11 +217,11 @@ def _credibility_arms() -> str:
         )
     shares = (
         "share of the poses, or of the range",
-        "from 0 to 57 degrees only",
-        "required",
-        "Modenese and Kohout's fibres",
+        "share from 0 to 57 degrees only",
+        "required share",
+        "share with Modenese and Kohout's fibres",
     )
-    poses = ("flexion, degrees", "poses", "bias", "scatter over the poses", "change on larger tetrahedra")
+    poses = ("flexion, degrees", "number of poses", "bias", "scatter over the poses", "change on larger tetrahedra")
     return table("credibility", ("case", "compared with", *shares, *poses), rows)
 
 

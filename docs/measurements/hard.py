@@ -81,9 +81,7 @@ def _hard_verdict(one: dict[str, Any]) -> str:
     if one["verdict"] == "not applicable":
         return "-"
     if one["verdict"] == "degraded":
-        return (
-            f"degraded: {one['quantity'].replace('_', ' ')} {one['value']:.2g} {one['unit']}, at most {one['bound']:g}"
-        )
+        return f"degraded: `{one['quantity']}` {one['value']:.2g} {one['unit']}, bound {one['bound']:g} {one['unit']}"
     return one["verdict"] if one["verdict"] == "ok" else f"{one['verdict']}: {one['sentence'].split(';')[0]}"
 
 
@@ -102,7 +100,8 @@ def _hard_programs_left_out() -> str:
         rows.append(
             (reason, len(cases), ", ".join(f"`{name}`" for name in names), ", ".join(f"`{name}`" for name in programs))
         )
-    return table("stress_programs", ("reason", "cases", "folders", "programs"), rows)
+    head = ("reason why cases do not apply", "number of cases", "folders of the cases", "programs")
+    return table("stress_programs", head, rows)
 
 
 def _stress_steps() -> str:
@@ -113,7 +112,7 @@ def _stress_steps() -> str:
         off = (one["off"].get(count, alone) for count in _STEPS)
         cells = (f"{share:.0e} %" if isinstance(share, float) else share for share in off)
         rows.append((f"`{one['case']}`", one["verdict"], one["frame"], *cells))
-    return table("stress", ("case", "verdict", "to frame", "1 step", "10 steps", "40 steps"), rows)
+    return table("stress", ("case", "verdict", "final frame", "1 step", "10 steps", "40 steps"), rows)
 
 
 def _jitters(found: dict[str, Any]) -> Any:
@@ -131,7 +130,14 @@ def _jitters_rows() -> str:
         ended, frames, most, median = one["meshes"] or ("not measured: too long", "", "", "")
         shares = (f"{share} %" if share else "" for share in (most, median))
         rows.append((f"`{one['case'].partition('.')[2]}`", one["status"], ended, frames, *shares))
-    head = ("case", "on its own mesh", "on ten other meshes", "up to frame", "greatest distance", "median distance")
+    head = (
+        "case",
+        "on its own mesh",
+        "on ten other meshes",
+        "last frame reached",
+        "maximum distance",
+        "median distance",
+    )
     return table("stress_jitters", head, rows)
 
 
