@@ -109,7 +109,7 @@ def _fibre_choice_rows() -> str:
         rows.append(
             (f"`{case}`" + f" ({ended})" * bool(ended), *(" / ".join(pair) for pair in zip(*cells, strict=True)))
         )
-    head = ("case", "fibres: shipped / other", "mean length at rest, mm", "change of mean length from rest to 0.5 rad, mm")
+    head = ("case", "fibres: shipped / other", "mean length at rest, mm", "change of mean length at 0.5 rad, mm")
     return table("fibre_choice", (*head, "moment arm at rest, mm", "moment arm at 0.5 rad, mm"), rows)
 
 
