@@ -157,7 +157,7 @@ def _omission_rows() -> str:
         time = "" if one["time"] is None else f"{100 * one['time']:.0f} %"
         rows.append((name, *changes, time, one["verdict"] or one["status"]))
     return table(
-        "effects", ("omitted", "surface, rms", "fibre length, rms", "volume", "remaining time", "result"), rows
+        "effects", ("omitted", "surface, rms", "fibre length, rms", "volume", "time without it", "result"), rows
     )
 
 

@@ -62,7 +62,7 @@ def _verify_groups() -> str:
         (name, len(ones), ", ".join(sorted({one["kind"] for one in ones})), number(max(map(_share, ones)), 2))
         for name, ones in groups.items()
     ]
-    return table("verify", ("group", "entries", "truth", "greatest ratio of error to tolerance"), rows)
+    return table("verify", ("group", "entries", "kind of truth", "maximum ratio of error to tolerance"), rows)
 
 
 def _share(entry: dict[str, Any]) -> float:

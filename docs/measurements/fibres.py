@@ -60,14 +60,14 @@ def _fibre_ends_rows() -> str:
         facts, covered = one["facts"], ", ".join(f"{name} {value:.0f}" for name, value in one["covered"].items())
         words = facts.get("fibre_ends_not_attached", "") + facts.get("fibre_ends_continued_by", "")
         named = [f"{end} point of fibre {fibre}: {float(far):.0f} mm" for end, fibre, far in _FAR.findall(words)]
-        far = ("by a tendon: " if "fibre_ends_continued_by" in facts else "") + (", ".join(named) or "none")
+        far = ("with a tendon: " if "fibre_ends_continued_by" in facts else "") + (", ".join(named) or "none")
         off = [one["status"] if value is None else f"{value:.1f}" for value in one["off"].values()] or [one["status"]]
         rows.append((f"`{one['case']}`", covered, f"{facts['fibre_ends']:.0f}", far, ", ".join(off)))
     beside, off_bone = (
         "ends more than 2 mm from their attachment",
-        "greatest distance of an end from its bone, 0.5, 1 rad, mm",
+        "maximum lag of an end behind its bone at 0.5, 1 rad, mm",
     )
-    return table("fibre_ends", ("case", "covered area of attachments, %", "ends", beside, off_bone), rows)
+    return table("fibre_ends", ("case", "covered area of attachments, %", "number of ends", beside, off_bone), rows)
 
 
 def _fibre_choice(found: dict[str, Any]) -> Any:
@@ -109,7 +109,7 @@ def _fibre_choice_rows() -> str:
         rows.append(
             (f"`{case}`" + f" ({ended})" * bool(ended), *(" / ".join(pair) for pair in zip(*cells, strict=True)))
         )
-    head = ("case", "fibres: shipped / others", "mean length at rest, mm", "its change to 0.5 rad, mm")
+    head = ("case", "fibres: shipped / other", "mean length at rest, mm", "change of mean length at 0.5 rad, mm")
     return table("fibre_choice", (*head, "moment arm at rest, mm", "moment arm at 0.5 rad, mm"), rows)
 
 
