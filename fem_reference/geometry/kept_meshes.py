@@ -1,4 +1,4 @@
-"""A cache on disk for tetrahedra and other arrays that take long to make: written atomically, and made again if damaged."""
+"""Disk cache for tetrahedra and other arrays that take long to compute. Files are written atomically and replaced if damaged."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -21,11 +21,11 @@ _FACETS = "facets "
 
 
 def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, Floats], folder: Path | None) -> TetMesh:
-    """The tetrahedra that ``mesher`` makes from a surface, ``size`` [mm] and ``shares``, as in
+    """Return the tetrahedra that ``mesher`` makes from a surface, ``size`` [mm] and ``shares``, as in
     :func:`fem_reference.geometry.tetrahedra.tetrahedralise`.
 
-    They are stored in ``folder``, if any, under a hash of everything on which they depend, including the code of this package and
-    the versions of packages that make meshes.
+    If there is a ``folder``, they are stored there under a hash of everything on which they depend, including the code of this
+    package and the versions of packages that make meshes.
     """
     if folder is None:
         return mesher(surface, size, shares)
@@ -36,7 +36,7 @@ def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, F
 
 @cache
 def code() -> str:
-    """A hash of all source files of this package, and of the versions of the packages that make meshes."""
+    """Hash of the source files in this folder and of the versions of the packages that make meshes."""
     folder = Path(__file__).parent
     sources = [np.frombuffer(path.read_bytes(), np.uint8) for path in sorted(folder.glob("*.py"))]
     return f"{fingerprint(*sources)} {versions(_MADE_WITH)}"
@@ -53,7 +53,7 @@ def _arrays(mesh: TetMesh) -> Arrays:
 
 
 def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays], of_arrays: Callable[[Arrays], T]) -> T:
-    """The value that ``of_arrays`` reads from the file at ``path``, else the result of ``make``, stored by ``to_arrays``."""
+    """Return the value that ``of_arrays`` reads from the file at ``path``; without a valid file, ``make`` it and store it there."""
     found = _read(path, of_arrays)
     if found is None:
         found = make()
@@ -62,7 +62,7 @@ def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays],
 
 
 def _read[T](path: Path, of_arrays: Callable[[Arrays], T]) -> T | None:
-    """The value in a file, None if it is missing or cannot be read completely."""
+    """Read the value in a file; None if the file is missing or cannot be read completely."""
     if not path.is_file():
         return None
     try:
@@ -74,7 +74,7 @@ def _read[T](path: Path, of_arrays: Callable[[Arrays], T]) -> T | None:
 
 
 def _write(path: Path, arrays: Arrays) -> None:
-    """Store arrays, safely for concurrent processes; warn if they cannot be written."""
+    """Store arrays, safely if several processes do so at the same time; log a warning if the file cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with files.whole(path) as part:
