@@ -91,7 +91,7 @@ class Pieces:
         return Pieces(np.tile(self.parents, 4), quartered(self.corners))
 
     def halved(self, lengths: Floats) -> "Pieces":
-        """Cut each piece into two at the midpoint of its longest edge; ``lengths`` (k, 3): lengths of the edges by first corner."""
+        """Cut each piece into two at the midpoint of its longest edge; ``lengths`` (k, 3): of the edge beginning at each corner."""
         order = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
         a, b, c = np.swapaxes(np.take_along_axis(self.corners, order[:, :, None], axis=1), 0, 1)
         halves = [np.stack([a, (a + b) / 2, c], axis=1), np.stack([(a + b) / 2, b, c], axis=1)]
