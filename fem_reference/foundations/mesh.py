@@ -127,7 +127,7 @@ def tet_volumes(points: Floats, tets: Ints) -> Floats:
 
 
 def upright(points: Floats, tets: Ints) -> Ints:
-    """Exchange two vertices of each of the ``tets`` (k, 4) that has a negative volume with the vertices ``points`` (n, 3)."""
+    """Return the ``tets`` (k, 4) on ``points`` (n, 3) with two vertices swapped in each tet that has a negative volume."""
     return np.where((tet_volumes(points, tets) < 0)[:, None], tets[:, [0, 2, 1, 3]], tets)
 
 

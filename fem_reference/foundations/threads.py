@@ -1,4 +1,4 @@
-"""Threads that work on several items at a time, each with a resource such as a process, and code that only one thread may run."""
+"""Threads that work on several items at a time, each with a resource such as a process, and code that one thread runs at a time."""
 
 import threading
 from collections.abc import Callable, Sequence

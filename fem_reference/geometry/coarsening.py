@@ -10,11 +10,11 @@ from fem_reference.geometry.edges import Edges
 
 # Chosen by trials on four hip muscles and a box; more rounds do not improve the result.
 _ROUNDS = 6
-# A vertex may move along a principal direction of the normals around it if this direction has less than this fraction of the sum of
-# their squares; the vertex then stays on its plane or sharp edge. Above 0.05, thin rims shrink; below 0.02, slivers remain.
+# A vertex may move along an eigenvector of its normal tensor (see ``_normal_tensors``) if the eigenvalue is below this fraction of
+# the sum of all three; it then stays on its plane or sharp edge. Above 0.05, thin rims shrink; below 0.02, slivers remain.
 _FREE = 0.03
 # The distance of the pole of inversion, in diagonals of the body. A nearer pole displaces sharp edges; with a farther one, flat
-# parts remain flat.
+# parts are not curved enough.
 _POLE = 6.0
 _NEARLY_FLAT = np.cos(np.radians(30))
 _TINY = np.finfo(float).tiny
@@ -76,9 +76,9 @@ def slide(points: Floats, triangles: Ints) -> Floats:
 
 
 def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> Floats:
-    """Part (k, 3) of the displacements ``steps`` (k, 3) [mm] that keeps the points ``chosen`` (k,) on a surface: the tangential
-    part at a smooth point, the part along the edge at a sharp edge, and 0 at a corner. The surface has ``points`` (n, 3) [mm] and
-    ``triangles`` (m, 3), with which ``chosen`` are numbered.
+    """Part (k, 3) of the displacements ``steps`` (k, 3) [mm] of some points that keeps them on the surface: the tangential part at
+    a smooth point, the part along the edge at a sharp edge, and 0 at a corner. ``points`` (n, 3) [mm] and ``triangles`` (m, 3)
+    define the surface, and ``chosen`` (k,) are the indices of the displaced points.
     """
     shares, directions = np.linalg.eigh(_normal_tensors(points, triangles))
     free = shares < _FREE * shares.sum(axis=1, keepdims=True)

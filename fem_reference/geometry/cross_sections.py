@@ -13,8 +13,8 @@ from fem_reference.foundations.mesh import Floats, Ints, TetMesh, normals
 
 # A point whose value is this close to the level counts as above it, so that no triangle has two coincident corners.
 _NUDGE = 1e-4
-# The corners of the unit square, counter-clockwise from the midpoint of the side x = 1: their positions along the boundary, as
-# fractions of its length, and their x and y coordinates.
+# Points on the boundary of the unit square, counter-clockwise: the midpoint of the side x = 1, the four corners, and the midpoint
+# again. Their positions along the boundary, as fractions of its length, and their x and y coordinates.
 _SHARES = (0, 1 / 8, 3 / 8, 5 / 8, 7 / 8, 1)
 _SQUARE = ((1, 1, 0, 0, 1, 1), (0.5, 1, 1, 0, 0, 0.5))
 _SAMPLES = 360  # the number of points on each rim that are matched
@@ -53,7 +53,7 @@ class CrossSection:
         return loop if upward else loop[::-1]
 
     def turns(self, first: Floats) -> Floats:
-        """Positions (k,) of the rim points along the boundary of the unit square, in turns from the midpoint of its side x = 1.
+        """Positions (k,) of the rim points on the boundary of the unit square, from 0 to 1 around it, 0 at x = 1, y = 1/2.
 
         ``first`` (3,): the direction in the section that is mapped to the x axis of the square. Positions are fractions of the
         rim's length after a stretch that makes the width and height of the section equal, so that a rectangle is mapped linearly.
@@ -164,7 +164,7 @@ def _at(places: Floats, shares: Floats, rim: Floats) -> Floats:
 
 
 def _continued(places: Floats, known: Floats, values: Floats) -> Floats:
-    """Interpolate ``values`` (k,), given at the positions ``known`` (k,) around a rim, at ``places`` (n,). All are in turns."""
+    """Interpolate ``values`` (k,), given at the positions ``known`` (k,) around a rim, at ``places`` (n,). All have period 1."""
     return places + np.interp(places, known, np.unwrap(values - known, period=1), period=1)
 
 

@@ -26,8 +26,8 @@ _SHORTEST = 0.1  # the minimum length of a pennate fibre along the muscle, as a 
 @dataclass(frozen=True, eq=False)
 class Contours:
     """Sections of a muscle from one attachment to the other. ``squares``: the positions of the points of each section in the unit
-    square; ``heights`` (k,): the positions of the sections, from 0 to 1, along the line through their centres; ``length``: its
-    length [mm].
+    square; ``heights`` (k,): the positions of the sections, from 0 to 1, along the line through their centres; ``length`` [mm]: the
+    length of this line.
     """
 
     sections: tuple[CrossSection, ...]

@@ -34,7 +34,9 @@ class GaussianSurface:
     radii: Floats
 
     def level(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Log of the sum (n,) at ``points`` (n, 3), positive inside; its gradient (n, 3) [1/mm]; shares (n, m) of the Gaussians."""
+        """Return three quantities at ``points`` (n, 3): the log of the sum (n,), which is positive inside the surface; its gradient
+        (n, 3) [1/mm]; and the share (n, m) of each Gaussian in the sum.
+        """
         exponents = -cdist(points, self.centres, "sqeuclidean") / self.radii**2
         level = scipy.special.logsumexp(exponents, axis=1)
         shares = np.exp(exponents - level[:, None])

@@ -24,8 +24,8 @@ def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, F
     """Return the tetrahedra that ``mesher`` makes from a surface, ``size`` [mm] and ``shares``, as in
     :func:`fem_reference.geometry.tetrahedra.tetrahedralise`.
 
-    If there is a ``folder``, they are stored there under a hash of everything on which they depend, including the code of this
-    package and the versions of packages that make meshes.
+    If there is a ``folder``, the tetrahedra are stored there under a hash of everything on which they depend, including the code in
+    :mod:`fem_reference.geometry` and the versions of packages that make meshes.
     """
     if folder is None:
         return mesher(surface, size, shares)
@@ -69,7 +69,7 @@ def _read[T](path: Path, of_arrays: Callable[[Arrays], T]) -> T | None:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             return of_arrays(dict(arrays))
     except Exception as error:  # zipfile and numpy raise many types of errors on a damaged file
-        log.warning("%s: the stored arrays are damaged and are made again: %s", path, error)
+        log.warning("%s: the stored arrays are damaged and are computed again: %s", path, error)
         return None
 
 

@@ -40,7 +40,7 @@ class _Sorted:
             self.code.forget(self.grid)
 
 
-# Pairs with a bone are searched in many frames, always in the bone's coordinates, so the bone's sorted triangles are kept.
+# Pairs with a bone are searched in many frames, always in the bone's coordinates, so the bone's sorted triangles are cached.
 _kept = lru_cache(maxsize=8)(_Sorted)
 
 

@@ -17,9 +17,8 @@ def passed(starts: Floats, ends: Floats, before: Floats, after: Floats) -> NDArr
     """Mask (n,) of the points that pass through the triangle in the same row from its front to its back. The points move straight
     from ``starts`` to ``ends`` (n, 3), and the corners of the triangles from ``before`` to ``after`` (n, 3, 3).
 
-    The volume of the tetrahedron formed by point and triangle is a cubic function of the fraction of the path (Provot 1997,
-    Collision and self-collision handling in cloth model dedicated to design garments). Where it is 0, the point is in the
-    triangle's plane.
+    The volume of the tetrahedron formed by point and triangle is a cubic function of the fraction of the path, and is 0 where the
+    point is in the plane (Provot 1997, Collision and self-collision handling in cloth model dedicated to design garments).
     """
 
     def at(share: float, some: NDArray[np.int64] | slice) -> tuple[Floats, Floats]:

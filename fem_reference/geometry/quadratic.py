@@ -13,8 +13,7 @@ from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, TetMesh, cor
 EDGES = np.array([[0, 1], [0, 2], [1, 2], [0, 3], [1, 3], [2, 3]])
 _MIDDLE = np.zeros((4, 4), np.int64)
 _MIDDLE[EDGES[:, 0], EDGES[:, 1]] = _MIDDLE[EDGES[:, 1], EDGES[:, 0]] = np.arange(4, 10)
-# The weights of the ten nodes in the mean of a quadratic function over a straight tet, and of the six nodes over a straight
-# triangle.
+# The weights of the ten nodes in the mean of a quadratic function over a straight tet, and of the six nodes over a triangle.
 _BULK = np.repeat([-1 / 20, 1 / 5], [4, 6])
 _FLAT = np.repeat([0, 1 / 3], 3)
 

@@ -16,8 +16,7 @@ Region = Callable[[Floats], Floats]
 Depth = Callable[[Floats], Floats]
 # The slope of the share at the depth ``width``, divided by its slope at the border.
 _RISE = 1000.0
-# Points on the border of a cell are moved by this fraction of the way to its centre, so that they are in the same regions as the
-# cell.
+# Points on the border of a cell are moved by this fraction of the way to its centre, to be in the same regions as the cell.
 INWARDS = 1e-6
 # The approximate number of grid points in the bounding box of a body.
 _SAMPLES = 20_000
@@ -25,12 +24,12 @@ _SAMPLES = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Blended:
-    """The region in which ``depth`` is positive. Its share is ``(1000^t - 1) / 999``, where t grows from 0 at the border to 1 at
-    ``width`` [mm] below it.
+    """The region in which ``depth`` is positive. Its share is ``(1000^t - 1) / 999``, where t grows from 0 at the border to 1 at a
+    depth of ``width`` [mm]; with a width of 0 the share jumps to 1.
 
     In a region that is a thousand times as stiff as the body, the stiffness then grows by the same factor in equal parts of the
     width, so elements that resolve the width converge; with ``3 t^2 - 2 t^3`` most of the growth would be in a fiftieth of the
-    width. The stiffer material should therefore be the region. In tension across the border, 0.14 of the width acts as soft
+    width. The region should therefore be the stiffer material. In tension across the border, 0.14 of the width acts as soft
     material.
     """
 
@@ -83,7 +82,8 @@ class Around:
 @dataclass(frozen=True, eq=False)
 class Between:
     """Depth inside the part of a body in which a Laplace ``field``, 0 and 1 on two attachments, is between ``first`` and ``last``.
-    The depth is the difference between the field and the nearer of these values, divided by the mean slope of the field.
+    The depth is the difference between the field and the nearer of these values, divided by the mean slope of the field. A
+    ``first`` of 0 or a ``last`` of 1 is no border.
     """
 
     field: FibreField

@@ -99,7 +99,7 @@ def _inside(grid: Floats, count: int) -> list[Floats]:
 
 
 def _loop(points: Floats, turns: Floats) -> Floats:
-    """Points (n, 3) at ``turns`` (n,) around a closed spline through ``points`` (m, 3), or a polygon if two of these coincide."""
+    """Points (n, 3) at the fractions ``turns`` (n,) of a closed spline through ``points`` (m, 3), or a polygon if two coincide."""
     closed = np.concatenate([points[-2:], points, points[:3]])
     at = turns * len(points) + 2
     if np.linalg.norm(np.diff(closed, axis=0), axis=1).min() == 0:

@@ -105,7 +105,7 @@ def _mesh(surface: Surface, size: float, shares: Mapping[str, Floats]) -> TetMes
             return replace(mesh, facets=_labelled(mesh, coarse, labels, list(shares)))
         except InputError as error:
             reason = str(error)
-    log.warning("%s: meshed by fTetWild, anew each time, as gmsh failed: %s", surface.place, reason)
+    log.warning("%s: meshed by fTetWild, differently each time, because gmsh failed: %s", surface.place, reason)
     return checked(run("tetwild", surface, size), surface)
 
 

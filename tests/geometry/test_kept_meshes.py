@@ -67,7 +67,7 @@ def test_a_damaged_file_is_made_anew_and_a_folder_that_cannot_be_is_no_reason_to
     path.write_bytes(path.read_bytes()[:100])
     assert cached(mesher, BOX, 3.0, SHARES, tmp_path).maker == "gmsh"
     assert mesher.count == 2
-    assert "damaged and are made again" in caplog.text
+    assert "damaged and are computed again" in caplog.text
     (tmp_path / "file").write_text("")
     assert cached(mesher, BOX, 3.0, SHARES, tmp_path / "file" / "kept").maker == "gmsh"
     assert "were not stored" in caplog.text
@@ -105,7 +105,7 @@ def test_a_damaged_file_is_made_anew(data, asked, tmp_path: Path, caplog) -> Non
     assert call(path).tobytes() == VALUES.tobytes()
     assert call(path).tobytes() == VALUES.tobytes()
     assert made == [0, 1]
-    assert f"{path}: the stored arrays are damaged and are made again" in caplog.text
+    assert f"{path}: the stored arrays are damaged and are computed again" in caplog.text
 
 
 def test_arrays_that_are_programs_are_not_run(asked, tmp_path: Path, caplog) -> None:
