@@ -14,7 +14,7 @@ def said(value: object) -> str:
 
 
 def path(given: Any, place: str) -> Path:
-    """Convert ``given`` to a path, which need not exist; InputError at ``place`` if it cannot be a path."""
+    """Convert ``given`` to a path, which need not exist; InputError that names ``place`` if it cannot be a path."""
     if not isinstance(given, str | Path) or not str(given):
         raise InputError(place, said(given), "a path")
     try:

@@ -1,4 +1,4 @@
-"""Loads on a body: their amounts over time, their resultant forces and moments, and the integrals over the body that these need."""
+"""Loads on a body: their amounts over time, their resultant forces and moments, and the integrals over the body that they need."""
 
 from typing import NamedTuple, Protocol
 
@@ -36,7 +36,7 @@ class Shape(Protocol):
         """
 
     def facing(self, on: str) -> tuple[Floats, Floats] | None:
-        """Return the outward vector area (3,) [mm2] of a region now and its moment (3,) [mm3] about the origin; None if unknown."""
+        """Current vector area (3,) [mm2] of a region, outward, and its moment (3,) [mm3] about the origin; None if unknown."""
 
     def motion(self) -> tuple[Floats, Floats] | None:
         """Return the integral (3,) [mm4/s] of the velocity over the rest volume and its moment (3,) [mm5/s]; None if unknown."""

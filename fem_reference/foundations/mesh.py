@@ -164,7 +164,7 @@ def united(parts: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
 
 
 def check_finite(surface: Surface) -> None:
-    """Raise InputError if a surface has no triangles, points that are not finite or too far away, or missing vertices."""
+    """Raise InputError for a surface without triangles, with points not finite or too far away, or with invalid triangles."""
     if len(surface.triangles) == 0:
         raise InputError(surface.place, "no triangles", "a triangle surface")
     bad = np.flatnonzero(~np.isfinite(surface.points).all(axis=1))
@@ -277,7 +277,7 @@ class Polylines:
         return len(self.offsets) - 1
 
     def lengths(self, points: Floats | None = None) -> Floats:
-        """Length (len(self),) [mm] of each line at rest or, if ``points`` (n, 3) are given, after its points have moved to them."""
+        """Length (len(self),) [mm] of each line, at rest or with the points of the lines moved to ``points`` (n, 3)."""
         steps = np.linalg.norm(np.diff(self.points if points is None else points, axis=0), axis=1)
         along = np.concatenate([[0.0], np.cumsum(steps)])
         return np.asarray(along[self.offsets[1:] - 1] - along[self.offsets[:-1]])

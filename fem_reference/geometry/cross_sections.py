@@ -178,7 +178,9 @@ def _nearest(rim: Floats, shares: Floats, point: Floats) -> float:
 
 
 def _matched(one: Floats, other: Floats) -> Floats:
-    """Fraction (n,) of the length by which the match on ``one`` (n, 3) of each sample of the rim ``other`` (n, 3) is ahead."""
+    """Match each sample of the rim ``other`` (n, 3) with a point of the rim ``one`` (n, 3). Returns the lead (n,) of the match over
+    the sample of ``one`` with the same index, as a fraction of the rim's length.
+    """
     shift = int(np.argmin([((np.roll(one, -by, axis=0) - other) ** 2).sum() for by in range(len(one))]))
     reach = range(shift - _REACH, shift + _REACH + 1)
     apart = np.stack([((np.roll(one, -by, axis=0) - other) ** 2).sum(axis=1) for by in reach], axis=1)

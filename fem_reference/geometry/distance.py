@@ -136,7 +136,7 @@ def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
 
 
 def farthest_points(points: Floats, count: int) -> Ints:
-    """Indices (count,) of ``points`` (n, d): first the point farthest from the mean, then always that farthest from all chosen."""
+    """Indices (count,) of ``points`` (n, d): first the farthest from the mean, then each time the farthest from those chosen."""
     chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     away = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):

@@ -20,7 +20,7 @@ _NEAR = 1e-3  # a line has arrived at an attachment where the field is this clos
 # Seeds whose scores differ by less than this fraction are taken in the order of their indices, so that rotating a mesh does not
 # change the lines.
 _TIES = 1e-6
-_HALFWAY = 0.5 - _TIES  # a field value that differs from 1/2 by rounding only counts as above it
+_HALFWAY = 0.5 - _TIES  # a field value that differs from 1/2 only by rounding counts as above it
 
 # A function that maps cells (n,) and rest points (n, 3) in them to unit vectors (n, 3); it can be pickled.
 Directions = Callable[[Ints, Floats], Floats]
@@ -178,7 +178,7 @@ def _seeds(field: FibreField) -> Floats:
 
 
 def spread(points: Floats, count: int) -> Floats:
-    """Choose at most ``count`` of ``points`` (k, d): first the most central, then always that farthest from all chosen points."""
+    """Choose at most ``count`` of ``points`` (k, d): first the most central, then each time the farthest from those chosen."""
     chosen = [_first_best(-np.linalg.norm(points - points.mean(axis=0), axis=1))]
     distances = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):

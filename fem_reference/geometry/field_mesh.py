@@ -108,13 +108,11 @@ def share_above(mesh: FieldMesh, level: float) -> Floats:
 
 
 def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: int) -> tuple[float, Floats]:
-    """Return the maximum Peclet number of all cells and, for each (m,), the parameter ``tau = h / 2|v| (coth Pe - 1 / Pe)`` of
-    upwinding.
+    """Return the maximum Peclet number of the cells, and their upwinding parameters ``tau = h / 2|v| (coth Pe - 1 / Pe)`` (m,).
 
     ``Pe = |v| h / 2k``, with the ``diffusion`` k and the part v of the ``velocity`` (d,) along the cell (Brooks and Hughes 1982,
     doi 10.1016/0045-7825(82)90071-8). The distance h between nodes along v is ``2|v| / sum |v . grad lambda|``, divided by the
-    ``order`` of the elements (Tezduyar 1986). On an interval with constant coefficients, tau makes linear elements exact at their
-    nodes.
+    ``order`` of the elements (Tezduyar 1986). For constant coefficients on an interval, tau makes linear elements exact at nodes.
     """
     slopes = barycentric_gradients(mesh)
     rates = np.abs(slopes @ velocity).sum(axis=1) * order / 2  # |v| / h

@@ -79,8 +79,7 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
 
 
 def streamlines(flux: Flow, count: int) -> Polylines:
-    """Compute ``count`` lines of 40 points along ``flux``, each for an equal area of both attachments; InputError if there are
-    fewer.
+    """Compute ``count`` lines of 40 points along ``flux``, each for an equal area of both attachments; InputError for too few.
 
     More lines are started evenly over the area and grouped so that the groups are compact at both ends (Lloyd 1982), with distances
     in units of the size of each attachment. The central line of each group is returned.

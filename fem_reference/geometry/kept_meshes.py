@@ -53,7 +53,7 @@ def _arrays(mesh: TetMesh) -> Arrays:
 
 
 def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays], of_arrays: Callable[[Arrays], T]) -> T:
-    """Return the value that ``of_arrays`` reads from the file at ``path``; without a valid file, ``make`` it and store it there."""
+    """Return what ``of_arrays`` reads from the file at ``path``; without a valid file, call ``make`` and store its result there."""
     found = _read(path, of_arrays)
     if found is None:
         found = make()

@@ -45,8 +45,9 @@ _kept = lru_cache(maxsize=8)(_Sorted)
 
 
 def near_pairs(one: Surface, other: Surface) -> Ints | None:
-    """Find pairs (k, 2) of triangles of two surfaces, or of one surface with itself, that may intersect or touch: every pair that
-    does, once, and few others. Triangles of one surface that share an edge, or touch only at a common corner, are left out.
+    """Find pairs (k, 2) of triangles of two surfaces, or of one surface with itself, that may intersect or touch. Each pair that
+    does is found once, along with few that do not. Triangles of one surface that share an edge or touch only at a corner are left
+    out.
 
     Returns None without a compiler, or if a point is not finite or very far away. Repeated calls with one ``other`` are faster.
     """

@@ -58,7 +58,9 @@ def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) 
 
 
 def _cut(mesh: TetMesh, on_rim: Bools) -> tuple[Ints, Ints, Floats]:
-    """Return the ends (e, 2) of edges, the edges (k, 6) of each tet, and a new point (e, 3) on each; ``on_rim`` (n,): a mask."""
+    """Return the ends (e, 2) of the edges, the edges (k, 6) of each tet, and a new point (e, 3) on each edge. ``on_rim`` (n,): mask
+    of the points on rims.
+    """
     ends, which = np.unique(np.sort(mesh.tets[:, EDGES].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
     first, second = on_rim[ends[:, 0]], on_rim[ends[:, 1]]
     at = np.where(first & ~second, GRADED, np.where(second & ~first, 1 - GRADED, 0.5))[:, None]
@@ -86,7 +88,9 @@ def _eighths(points: Floats, nodes: Ints) -> Ints:
 
 
 def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
-    """Four parts (4 m, 3) of each of ``faces`` (m, 3), with the same orientation. ``keys`` are the sorted keys of the edges."""
+    """Four parts (4 m, 3) of each of ``faces`` (m, 3), with the same orientation. ``keys``: the sorted keys of the edges, on which
+    new points are numbered from ``count`` on.
+    """
     if len(faces) == 0:
         return faces
     pairs = np.sort(faces[:, [[0, 1], [0, 2], [1, 2]]], axis=2)

@@ -131,7 +131,7 @@ class Ring:
         return np.asarray(2 * (squares + around * (1 - self.radius / away)))
 
     def pushed(self, points: Floats) -> Floats:
-        """Move those ``points`` (n, 3) that are inside to the surface, away from the circle in the tube's centre."""
+        """Move those ``points`` (n, 3) that are inside to the surface, away from the central circle of the tube."""
         middle = self._nearest(points)
         across = points - middle
         across[np.linalg.norm(across, axis=1) < _MIDDLE * self.tube] = _MIDDLE * self.tube * self.pose[:3, 2]

@@ -37,7 +37,9 @@ class Displaced:
         return np.asarray(np.concatenate([corners, middles], axis=1) + (np.nan if self.by is None else self.by))
 
     def measure(self, on: str | None = None) -> tuple[float, Floats]:
-        """Return the rest volume [mm3], or the rest area [mm2] of a region ``on``, and the integral (3,) of current positions."""
+        """Return the rest volume [mm3], or the rest area [mm2] of a region ``on``, and the integral (3,) of the current positions
+        over that volume or area.
+        """
         if on is None:
             sizes = tet_volumes(self.mesh.points, self.mesh.tets)
             means = np.einsum("q,kqi->ki", _BULK, self.nodes)
@@ -48,7 +50,7 @@ class Displaced:
         return float(sizes.sum()), np.asarray(sizes @ means)
 
     def facing(self, on: str) -> tuple[Floats, Floats] | None:
-        """Return the outward vector area (3,) [mm2] of a region now and its moment (3,) [mm3] about the origin; None if unknown."""
+        """Current vector area (3,) [mm2] of a region, outward, and its moment (3,) [mm3] about the origin; None if unknown."""
         if self.by is None:
             return None
         tets, local = self._facets(on)

@@ -38,7 +38,9 @@ class Obstacle(Protocol):
         """The maximum depth [mm] of a point inside the bone."""
 
     def clearance(self, within: float) -> Callable[[Floats], Floats]:
-        """Return a function of points (n, 3): a lower bound (n,) on the length of paths to a point ``within`` [mm] of the bone."""
+        """Return a function of points (n, 3) [mm]. It gives a lower bound (n,) [mm] on the length of any path from each point to
+        within ``within`` [mm] of the bone.
+        """
 
     def sample(self, points: Floats) -> Sampled:
         """Distance and its two derivatives at ``points`` (n, 3) [mm], in the bone's rest pose; NaN where a coordinate is NaN."""

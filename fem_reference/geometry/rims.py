@@ -84,7 +84,7 @@ def _smoothed(surface: Surface, shares: Floats, length: float) -> Floats:
 
 
 def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
-    """Add a point in each island of an attachment that has an area of at least ``least`` [mm2] but contains no point."""
+    """Add a point in each island of an attachment that has at least ``least`` [mm2] but contains no point of the coarse surface."""
     number = _islands(fine, shares)
     attached = number >= 0
     thirds = np.tile(triangle_areas(fine.points, fine.triangles)[:, None] / 3, 3)
@@ -232,7 +232,7 @@ def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats
 
 
 def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Floats) -> tuple[Floats, Ints, Ints]:
-    """Return points, triangles whose ``chosen`` edges are cut at ``middles`` (k, 3) on ``fine``, and the original of each."""
+    """Return the points, the triangles after cuts of the ``chosen`` edges at ``middles`` (k, 3) on ``fine``, and their parents."""
     new = np.full(len(edges.ends), -1)
     new[chosen] = len(parts.points) + np.arange(len(chosen))
     points = np.concatenate([parts.points, distances(middles, fine).closest])
@@ -240,7 +240,7 @@ def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Fl
 
 
 def _divided(points: Floats, triangles: Ints, cuts: Ints) -> tuple[Ints, Ints]:
-    """Cut triangles at the points ``cuts`` (m, 3) opposite their corners, -1 for none; return them and indices of originals."""
+    """Cut triangles at the points ``cuts`` (m, 3) opposite their corners, -1 for none; returns the triangles and their parents."""
     count = (cuts >= 0).sum(axis=1)
     pieces, parents = [triangles[count == 0]], [np.flatnonzero(count == 0)]
     one = np.flatnonzero(count == 1)

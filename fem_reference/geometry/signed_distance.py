@@ -1,4 +1,4 @@
-"""Signed distance to a body with a triangulated surface, sampled once on a regular grid, inside which it is twice differentiable.
+"""Signed distance to a bone with a triangulated surface, sampled once on a regular grid, inside which it is twice differentiable.
 
 Tricubic B-splines interpolate between the nodes, so gradient and curvature are continuous, as Newton's method requires.
 """

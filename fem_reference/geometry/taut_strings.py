@@ -53,7 +53,9 @@ def halved(string: Floats) -> Floats:
 
 
 def touching(obstacle: SmoothSurface, string: Floats) -> Flags:
-    """Mask (n, N) of points of strings that may touch an obstacle, as they are nearer than its tangent a third of a piece away."""
+    """Mask (n, N) of the points of strings that may touch an obstacle: they are nearer to it than a tangent is, a third of a piece
+    away from the point at which the tangent touches it.
+    """
     value, slope = obstacle.level(string.reshape(-1, 3))
     away = (value / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)).reshape(string.shape[:2])
     piece = np.linalg.norm(np.diff(string, axis=1), axis=2).max(axis=1) * 2

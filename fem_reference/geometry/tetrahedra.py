@@ -64,9 +64,9 @@ def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] |
 
 
 def check_size(surface: Surface, size: float) -> None:
-    """Raise InputError if more than ``_MOST_TETS`` regular tets would fill a surface, or ``size`` exceeds its smallest extent.
+    """Raise InputError if more than ``_MOST_TETS`` regular tets would fill a surface, or if its smallest extent is below ``size``.
 
-    The extent is measured along the coordinate axes; :func:`tetrahedralise` passes the surface in a frame that rotates with it.
+    The extent is that along a coordinate axis; :func:`tetrahedralise` passes the surface in a frame that rotates with it.
     """
     volume, extent = enclosed_volume(surface.points, surface.triangles), np.ptp(surface.points, axis=0).min()
     if not volume <= _MOST_TETS * size**3 / (6 * np.sqrt(2)):

@@ -1,4 +1,4 @@
-"""Shortest paths between two points around a wrapping surface, a sphere or a cylinder: straight, geodesic, straight.
+"""Shortest paths between two points around a sphere or a cylinder: a straight piece, a geodesic and a straight piece.
 
 On the surface a path is a geodesic: a great circle of the sphere or a helix of the cylinder. Seen along the axis of rotation, each
 is an arc of a circle between two tangents, so one closed form holds for both (the "obstacles" of Garner and Pandy 2000, Comput.
