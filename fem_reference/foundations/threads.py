@@ -12,7 +12,9 @@ _MAKING = threading.RLock()
 
 
 def made_once[T](make: Callable[[], T]) -> Callable[[], T]:
-    """Return a function that calls ``make`` when it is first called, in one thread at a time, and then returns the same result."""
+    """Return a function that calls ``make`` when it is first called and then returns the same result. Only one thread calls any
+    ``make`` at a time; a thread that had to wait for another to finish the same ``make`` calls it again.
+    """
 
     @cache
     def made() -> T:
