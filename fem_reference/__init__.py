@@ -10,7 +10,8 @@
     print(result[mine.name, "surface_deviation", "rms"].values.max())  # [mm]
     fr.write_report(result, "my_report")
 
-Modules are loaded when a name is first used. Units are mm, N, MPa, s and rad everywhere; only scene files have others, as text.
+Modules are loaded when one of their names is first used. Units are mm, N, MPa, s and rad, except in scene files, where each
+quantity is written with its unit.
 """
 
 import ast
@@ -23,7 +24,7 @@ if sys.version_info[:2] < (3, 12):  # noqa: UP036 - pip does not check the versi
     wanted = "fem_reference needs Python 3.12 or newer: python3.12 -m venv .venv, and install it there"
     raise ImportError(f"this is Python {sys.version.split()[0]} ({sys.executable}); {wanted}")
 
-# The public names, each with its module and its name in it; the stub beside this file imports the same names.
+# The public names, each with its module and its name in that module, read from the stub file next to this file.
 _PLACES = {
     alias.asname or alias.name: (node.module or "", alias.name)
     for node in ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")).body

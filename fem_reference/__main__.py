@@ -1,4 +1,4 @@
-"""``python -m fem_reference``: the same as the command ``fem-reference``."""
+"""Command ``python -m fem_reference``, the same as ``fem-reference``."""
 
 from fem_reference.cli import entry
 

@@ -1,15 +1,15 @@
-"""The two exceptions of this package: input that is not usable, and software that is not installed."""
+"""The two exceptions of this package: one for unusable input, one for software that is not installed."""
 
 import errno
 
 # Error numbers of a full disk, an exhausted quota and a file that is too large.
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-# The maximum number of characters of a value that a message shows.
+# The maximum number of characters of a value in a message.
 _SHOWN = 400
 
 
 class InputError(Exception):
-    """Unusable input: its place (file and key), the given value and the wanted value.
+    """Unusable input: the file and key (``place``), the value found there (``got``) and the value expected (``want``).
 
     >>> str(InputError("case.toml: effect[0].mu", '"1 mm"', "a pressure"))
     'case.toml: effect[0].mu: got "1 mm", want a pressure'
@@ -20,12 +20,12 @@ class InputError(Exception):
         self.place, self.got, self.want = place, got, want
 
     def __reduce__(self) -> tuple[type["InputError"], tuple[object, object, str]]:
-        """The class and its arguments, so that an error can be passed to another process."""
+        """Return the class and its arguments, so that the error can be passed to another process."""
         return type(self), (self.place, self.got, self.want)
 
 
 def _shown(value: object) -> str:
-    """A value as one line of text for a terminal: shortened, and without control characters."""
+    """Format a value as one line of text for a terminal: shortened if it is long, with control characters escaped."""
     text = str(value)
     if len(text) > _SHOWN:
         text = f"{text[: _SHOWN // 2]} ... {text[-_SHOWN // 4 :]}"

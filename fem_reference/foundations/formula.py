@@ -1,4 +1,4 @@
-"""Formulas as text, such as ``"x**2/2 - 2*x"``: checked when they are read, evaluated with numbers, arrays or symbols."""
+"""Formulas as text, such as ``"x**2/2 - 2*x"``: checked when they are read, and evaluated with numbers, arrays or symbols."""
 
 import ast
 import math
@@ -14,7 +14,7 @@ from fem_reference.foundations.errors import InputError
 FUNCTIONS = ("sin", "cos", "exp", "sqrt", "tanh")
 COORDINATES = ("x", "y", "z")
 _WANT = f'a number, or a formula of x, y, z, pi, + - * / ** and {", ".join(FUNCTIONS)}, such as "sin(pi*x)"'
-_LONGEST = 1000  # the maximum number of characters, far fewer than exhaust the recursion over a syntax tree
+_LONGEST = 1000  # the maximum number of characters, too few to exceed Python's recursion limit in ``evaluate``
 _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: lambda a, b: a + b,
     ast.Sub: lambda a, b: a - b,
@@ -25,7 +25,7 @@ _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 
 def _checked(value: object) -> str:
-    """The text of a formula; ValueError if ``value`` is not a formula."""
+    """Return the text of a formula, given as a number or as text; ValueError if ``value`` is not a formula."""
     if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max:
         return repr(float(value))
     if not isinstance(value, str) or len(value) > _LONGEST:
@@ -37,7 +37,7 @@ def _checked(value: object) -> str:
     except (SyntaxError, InputError, RecursionError) as error:
         raise ValueError(_WANT) from error
     except ArithmeticError:
-        pass  # still a formula, although it has no finite value at the tested point
+        pass  # it is still a formula, although its value at the tested point is not finite
     return value
 
 
@@ -45,7 +45,9 @@ Formula = Annotated[str, BeforeValidator(_checked)]
 
 
 def evaluate(text: str, position: Sequence[Any], functions: Mapping[str, Any]) -> Any:
-    """The value of the formula ``text`` at a ``position`` (x, y, z or the first of these); ``functions``: callables by name.
+    """Evaluate the formula ``text`` at a ``position`` (x, y, z), (x, y) or (x,); ``functions`` maps names to callables.
+
+    Raises InputError if ``text`` contains anything but numbers, coordinates, pi, operators and functions.
 
     >>> evaluate("x**2/2 - 2*x", (1.0,), {})
     -1.5

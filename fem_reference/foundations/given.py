@@ -1,4 +1,4 @@
-"""Arguments of any type from callers in Python: described for messages, or checked as a path."""
+"""Checks and descriptions of arguments from Python callers, which may be of any type."""
 
 from pathlib import Path
 from typing import Any
@@ -9,18 +9,18 @@ from fem_reference.foundations.errors import InputError
 
 
 def said(value: object) -> str:
-    """A value as messages show it."""
+    """Describe a value for a message: the shape of an array, or the type and the repr of any other value."""
     return f"an array {value.shape}" if isinstance(value, np.ndarray) else f"{type(value).__name__} {value!r}"
 
 
 def path(given: Any, place: str) -> Path:
-    """The ``given`` path, whether it exists or not; InputError if it cannot be a path."""
+    """Convert ``given`` to a path, which need not exist; InputError that names ``place`` if it cannot be a path."""
     if not isinstance(given, str | Path) or not str(given):
         raise InputError(place, said(given), "a path")
     try:
         (Path(given) / "x").exists()
         Path(given).resolve()
         str(given).encode()
-    except (OSError, ValueError) as error:  # too long, or with a null character
+    except (OSError, ValueError) as error:  # the path is too long or contains a null character
         raise InputError(place, said(given), f"a path that can exist ({error})") from error
     return Path(given)

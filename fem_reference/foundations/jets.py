@@ -1,4 +1,4 @@
-"""Numbers with their first and second derivatives: expressions of jets are differentiated exactly, without finite differences."""
+"""Numbers with their first and second derivatives (jets), which differentiate an expression exactly, without finite differences."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,19 +12,21 @@ from fem_reference.foundations.mesh import Floats
 
 @dataclass(frozen=True, eq=False)
 class Jet:
-    """``value`` (...,), ``slope`` (n, ...) and ``curvature`` (n, n, ...) with respect to n variables, over points (...,). The
-    curvature is None if it is not needed, which saves nine tenths of the work. A slope or curvature that is the same at all points
-    has length 1 along the axes of the points. An array combined with a jet has as many axes as the points of the jet, or none.
+    """A function of n variables at points (...,), with its derivatives.
+
+    ``value`` (...,); ``slope`` (n, ...): the first derivatives; ``curvature`` (n, n, ...): the second derivatives, or None if they
+    are not needed, which saves nine tenths of the work. A slope or curvature that is the same at all points has length 1 along the
+    axes of the points. An array combined with a jet has as many axes as the points of the jet, or none.
     """
 
     value: Any
     slope: Any
     curvature: Any = None
 
-    __array_ufunc__ = None  # an array on the left leaves the operation to the jet
+    __array_ufunc__ = None  # numpy then leaves "array + jet" and the like to the methods of the jet
 
     def chained(self, value: Any, first: Any, second: Any) -> "Jet":
-        """A function of the jet, given its ``value`` and its ``first`` and ``second`` derivatives at ``self.value``."""
+        """Apply a function to the jet. ``value``, ``first``, ``second``: the function and its derivatives at ``self.value``."""
         if self.curvature is None:
             return Jet(value, first * self.slope, None)
         outer = self.slope[:, None] * self.slope[None]
@@ -71,20 +73,20 @@ class Jet:
 
 
 def variables(values: Floats, *, curved: bool = True) -> list[Jet]:
-    """The n variables as jets, at points where they have ``values`` (n, ...); without curvatures unless ``curved``."""
+    """Create the n variables as jets with the ``values`` (n, ...) at the points. The jets have no curvature unless ``curved``."""
     count, along = len(values), (1,) * (values.ndim - 1)
     slopes, flat = np.eye(count).reshape(count, count, *along), np.zeros((count, count, *along)) if curved else None
     return [Jet(value, slope, flat) for value, slope in zip(values, slopes, strict=True)]
 
 
 def constant(value: Any, like: Jet) -> Jet:
-    """A constant as a jet in the variables of ``like``."""
+    """Create a jet of a constant ``value`` in the variables of the jet ``like``."""
     curvature = None if like.curvature is None else np.zeros_like(like.curvature)
     return Jet(value + np.zeros_like(like.value), np.zeros_like(like.slope), curvature)
 
 
 def _differentiated(function: Callable[[Any], tuple[Any, Any, Any]]) -> Callable[[Any], Any]:
-    """A function of jets, numbers or arrays; ``function`` returns its value with its first and second derivatives."""
+    """Extend ``function``, which returns a value and its first and second derivatives, to jets, numbers and arrays."""
 
     def of(x: Any) -> Any:
         return x.chained(*function(x.value)) if isinstance(x, Jet) else function(np.asarray(x, float))[0]
@@ -93,7 +95,7 @@ def _differentiated(function: Callable[[Any], tuple[Any, Any, Any]]) -> Callable
 
 
 def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
-    """``then`` where ``x > limit``, else ``otherwise``; the derivatives are taken from the same branch."""
+    """Select ``then`` where ``x > limit`` and ``otherwise`` elsewhere; the derivatives come from the selected branch."""
     chosen = getattr(x, "value", x) > getattr(limit, "value", limit)
     like = next((branch for branch in (then, otherwise) if isinstance(branch, Jet)), None)
     if like is None:
@@ -103,7 +105,7 @@ def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
     return Jet(*(np.where(chosen, getattr(one, part), getattr(other, part)) for part in parts))
 
 
-# The functions that accept jets, numbers and arrays.
+# Functions that accept jets, numbers and arrays.
 JET_FUNCTIONS = Functions(
     exp=_differentiated(lambda v: (e := np.exp(v), e, e)),
     log=_differentiated(lambda v: (np.log(v), 1 / v, -1 / v**2)),

@@ -1,4 +1,4 @@
-"""Loads on a body: their amounts over time, their force and moment, and the integrals over the body that loads need."""
+"""Loads on a body: their amounts over time, their resultant forces and moments, and the integrals over the body that they need."""
 
 from typing import NamedTuple, Protocol
 
@@ -11,7 +11,7 @@ from fem_reference.foundations.records import Record
 
 
 class RampPoint(Record):
-    """The amount of an effect at a frame number: a factor of its parameters, up to a thousand."""
+    """The amount of an effect at a frame number: a factor from 0 to 1000 that multiplies the parameters of the effect."""
 
     frame: float
     amount: float = Field(ge=0, le=1000)
@@ -28,20 +28,24 @@ class Wrench(NamedTuple):
 
 
 class Shape(Protocol):
-    """The present shape of a body, and its velocity."""
+    """The current shape of a body, and its velocity."""
 
     def measure(self, on: str | None = None) -> tuple[float, Floats]:
-        """Volume [mm3] at rest, or area [mm2] of a region ``on``; integral (3,) of present positions over it; NaN if unknown."""
+        """Return the rest volume [mm3], or the rest area [mm2] of a region ``on``, and the integral (3,) of the current positions
+        over that volume or area, which is NaN if the positions are unknown.
+        """
 
     def facing(self, on: str) -> tuple[Floats, Floats] | None:
-        """The present vector area (3,) [mm2] of a region, outward, and its moment (3,) [mm3] about the origin; None if unknown."""
+        """Current vector area (3,) [mm2] of a region, outward, and its moment (3,) [mm3] about the origin; None if unknown."""
 
     def motion(self) -> tuple[Floats, Floats] | None:
-        """The integral of the velocity (3,) [mm4/s] over the rest volume and its moment (3,) [mm5/s]; None if unknown."""
+        """Return the integral (3,) [mm4/s] of the velocity over the rest volume and its moment (3,) [mm5/s]; None if unknown."""
 
 
 def dead(density: ArrayLike, shape: Shape, on: str | None = None) -> Wrench:
-    """The wrench of a force of ``density`` (3,) per unit rest volume or area, which moves with the body and keeps its direction."""
+    """Wrench of a dead load, which moves with the body and keeps its direction. ``density`` (3,): the force per unit rest volume,
+    or per unit rest area of the region ``on``.
+    """
     (measure, first), each = shape.measure(on), np.asarray(density, float)
     return Wrench(each * measure, np.cross(first, each))
 

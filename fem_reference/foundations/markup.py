@@ -1,11 +1,11 @@
-"""Small HTML tables that show records in a notebook, and values as text."""
+"""HTML tables that show records in a notebook, and text for values."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
 
 def fact_table(title: str, facts: Mapping[str, object]) -> str:
-    """A ``title`` over a table of names and values, all as plain text.
+    """Format an HTML table of names and values below a ``title``; all of them are plain text.
 
     >>> fact_table("bar", {"status": "a < b"})
     '<b>bar</b><table><tr><th style="text-align:left">status</th><td style="text-align:left">a &lt; b</td></tr></table>'
@@ -17,14 +17,14 @@ def fact_table(title: str, facts: Mapping[str, object]) -> str:
 
 
 def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A ``title`` over a table with ``heads`` and ``rows``, all as plain text."""
+    """Format an HTML table with column headings ``heads`` and ``rows`` below a ``title``; all of them are plain text."""
     head = "".join(f"<th>{escape(name)}</th>" for name in heads)
     body = "".join(f"<tr>{''.join(f'<td>{escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows)
     return f"<b>{escape(title)}</b><table><tr>{head}</tr>{body}</table>"
 
 
 def exact(value: object) -> str:
-    """A value as text with all its digits.
+    """Format a value as text, with up to 12 significant digits.
 
     >>> exact(0.123456), exact(True), exact("0.11.0"), exact(None), exact((0.0, -9810.0))
     ('0.123456', 'yes', '0.11.0', 'not set', '(0, -9810)')

@@ -1,4 +1,4 @@
-"""The state at a point of a body, with the invariants and functions in which laws are written."""
+"""State at a point of a body, with the invariants and functions from which laws are written."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Functions:
-    """Functions that an expression may call besides operators: in numpy, symbolically, or with derivatives.
+    """Functions that an expression may call in addition to operators: numerical, symbolic or with derivatives.
 
     ``above(x, limit, then, otherwise)`` is ``then`` where ``x > limit``, else ``otherwise``; both must be finite everywhere.
     """
@@ -26,13 +26,13 @@ def _above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
     return np.where(x > limit, then, otherwise)
 
 
-# The prefix of a region's name that means the rest of the body.
+# A region's name with this prefix means the part of the body outside the region.
 REST = "not "
 NUMPY = Functions(np.exp, np.log, np.sqrt, np.cos, np.sin, _above)
 
 
 class Moduli(NamedTuple):
-    """Stiffness at rest [MPa], 0 for none: ``shear`` (across fibres, if any), ``bulk``, and the stress that scales ``fibres``."""
+    """Stiffness at rest [MPa], 0 if absent: ``shear`` (transverse to any fibres), ``bulk``, and the stress scale of ``fibres``."""
 
     shear: float = 0.0
     bulk: float = 0.0
@@ -41,13 +41,13 @@ class Moduli(NamedTuple):
 
 @dataclass(frozen=True)
 class State:
-    """The state at a point that an expression depends on; each entry is a number, an array over points or a symbolic expression.
+    """State at a point from which an expression is computed. Each entry is a number, an array over points or a symbolic expression.
 
-    ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``; ``displacement``: (3,) [mm]; ``pressure``: the mixed pressure
-    unknown [MPa], None if no effect adds it; ``fibre``: the unit vector (3,) along the fibres at rest, None without fibres;
-    ``amount``: the factor of the effect (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] before the load step;
-    ``F_before``: its deformation gradient; ``predicted``: the displacement (3,) [mm] at constant velocity; ``rate``: 1 over the
-    duration of the step [1/s], 0 in a quasi-static step; ``regions``: the share of the point, from 0 to 1, in each region.
+    ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``. ``displacement``: (3,) [mm]. ``pressure``: the pressure unknown
+    [MPa] of a mixed formulation, None if no effect adds it. ``fibre``: the unit vector (3,) along the fibres at rest, None without
+    fibres. ``amount``: the factor of the effect (see :meth:`Effect.amount`). ``before``, ``F_before``: the displacement (3,) [mm]
+    and the deformation gradient before the load step. ``predicted``: the displacement (3,) [mm] at constant velocity. ``rate``: 1
+    over the duration of the step [1/s], 0 in a quasi-static step. ``regions``: the share of each region at the point.
     """
 
     F: Sequence[Sequence[Any]]
@@ -63,7 +63,7 @@ class State:
     functions: Functions = NUMPY
 
     def share(self, region: str) -> Any:
-        """The share, from 0 to 1, of the point in a ``region``: a name, ``"not NAME"`` for the rest, or ``""`` for all."""
+        """Share of a ``region`` at the point: ``"not NAME"`` is all of the body except the region NAME, ``""`` is all of it."""
         if region.startswith(REST):
             return 1 - self.regions[region.removeprefix(REST)]
         return self.regions[region] if region else 1.0
@@ -75,7 +75,7 @@ class State:
 
     @property
     def cofactors(self) -> Sequence[Sequence[Any]]:
-        """``J F^-T`` (3, 3): maps an area vector at rest to the deformed area vector (Nanson)."""
+        """``J F^-T`` (3, 3), which maps an area vector at rest to the deformed area vector (Nanson)."""
         F = self.F
         after = {0: (1, 2), 1: (2, 0), 2: (0, 1)}
         return [
@@ -100,16 +100,16 @@ class State:
         return sum(entry**2 for row in self.cofactors for entry in row)
 
     def square_stretch(self, direction: Sequence[Any]) -> Any:
-        """``direction . C direction``: the squared stretch of a line along the unit vector ``direction`` (3,) at rest."""
+        """Squared stretch ``direction . C direction`` of a line that is parallel to the unit vector ``direction`` (3,) at rest."""
         return sum(sum(F * a for F, a in zip(row, direction, strict=True)) ** 2 for row in self.F)
 
     @property
     def fibre_stretch(self) -> Any:
-        """``J^(-1/3) |F fibre|``: the isochoric stretch of the fibre."""
+        """Isochoric stretch ``J^(-1/3) |F fibre|`` of the fibre."""
         return self.J ** (-1 / 3) * self.functions.sqrt(self.square_stretch(self.fibre))
 
     def stretched(self, along: Any) -> Sequence[Sequence[Any]]:
-        """``F (l f f^T + l^(-1/2) (1 - f f^T))`` (3, 3): F after an isochoric stretch l ``along`` the fibre f."""
+        """``F (l f f^T + l^(-1/2) (1 - f f^T))`` (3, 3): F after an isochoric stretch l, ``along``, of the fibre f."""
         across = 1 / self.functions.sqrt(along)
         ends = [sum(F * a for F, a in zip(row, self.fibre, strict=True)) for row in self.F]
         return [
@@ -118,14 +118,14 @@ class State:
         ]
 
     def between(self, low: Any, high: Any, x: Any) -> Any:
-        """``x``, or the nearer bound if x is outside the bounds."""
+        """Clip ``x`` to the bounds ``low`` and ``high``."""
         above = self.functions.above
         return above(x, high, high, above(x, low, x, low))
 
 
 @dataclass(frozen=True)
 class FieldState:
-    """A scalar function at a point: its ``value``, ``gradient`` (one entry per coordinate) and, for an unknown, ``laplacian``."""
+    """State of a scalar field at a point: ``value``, ``gradient`` (one entry per coordinate) and, if unknown, ``laplacian``."""
 
     value: Any
     gradient: Sequence[Any]
@@ -134,8 +134,8 @@ class FieldState:
 
 @dataclass(frozen=True)
 class Place:
-    """A point at which a field effect acts: the ``position`` (x, y, z or the first of these), the ``functions`` of formulas, and
-    ``upper``, the fraction of the element above the mean y of the vertices.
+    """Point at which an effect on a scalar field acts. ``position``: (x, y, z), (x, y) or (x,); ``functions``: the functions that
+    formulas may call, by name; ``upper``: the fraction of the element that lies above the mean y of the vertices.
     """
 
     position: Sequence[Any]
@@ -144,7 +144,7 @@ class Place:
 
 
 def fibre_tension(energy: Callable[[State], Any], stretch: float, step: float = 1e-6) -> float:
-    """The force per unit rest area [MPa] along fibres at a ``stretch`` and constant volume, by differences of an ``energy``."""
+    """Force per unit rest area [MPa] along fibres at a ``stretch`` and constant volume, by central differences of ``energy``."""
 
     def along(length: float) -> float:
         across = length**-0.5

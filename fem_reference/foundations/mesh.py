@@ -1,6 +1,6 @@
-"""Triangle surfaces, tetrahedral meshes and polylines: records, measures, and checks that a surface is usable.
+"""Triangle surfaces, tetrahedral meshes and polylines: records, measurements, and checks that a surface is usable.
 
-Shapes of arrays: points ``(n, 3)`` [mm], triangles ``(m, 3)`` and tets ``(k, 4)`` of point indices.
+Shapes of arrays: points ``(n, 3)`` [mm]; triangles ``(m, 3)`` and tets ``(k, 4)`` of point indices.
 """
 
 import hashlib
@@ -20,14 +20,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-# The maximum coordinate [mm] of a surface: a thousand kilometres.
+# The maximum magnitude [mm] of a coordinate of a surface: a thousand kilometres.
 FARTHEST = 1e9
-# Corners of the four triangles of a tet, each ordered so that its normal points out of a tet of positive volume.
+# Corners of the four faces of a tet, ordered so that the normals point outwards if the tet has a positive volume.
 TET_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
 def read_only(values: Any, dtype: type) -> NDArray[Any]:
-    """A read-only copy of ``values``, or ``values`` itself if it is a read-only array that owns its data."""
+    """Return a read-only copy of ``values``, or ``values`` itself if it is already a read-only array that owns its data."""
     kept = isinstance(values, np.ndarray) and values.flags.owndata and not values.flags.writeable
     array: NDArray[Any] = np.array(values, dtype=dtype, order="C", copy=None if kept else True)
     array.setflags(write=False)
@@ -47,14 +47,14 @@ class Surface:
         object.__setattr__(self, "triangles", read_only(self.triangles, np.int64))
 
     def moved_to(self, points: Floats) -> "Surface":
-        """The same triangles on other ``points`` (n, 3)."""
+        """Return the surface with the same triangles and with its points at ``points`` (n, 3)."""
         return Surface(points, self.triangles, self.place)
 
 
 @dataclass(frozen=True, eq=False)
 class TetMesh:
-    """Tetrahedra: ``points`` (n, 3) [mm], ``tets`` (k, 4), all of positive volume; ``facets`` maps the name of a region of the
-    boundary to its triangles (m, 3); ``maker`` names the mesher, if any.
+    """A tetrahedral mesh: ``points`` (n, 3) [mm] and ``tets`` (k, 4), all of positive volume. ``facets``: the triangles (m, 3) of
+    each named region of the boundary; ``maker``: the name of the mesher, empty if there is none.
     """
 
     points: Floats
@@ -69,7 +69,7 @@ class TetMesh:
 
 
 def fingerprint(*arrays: NDArray[Any]) -> str:
-    """A hash over the bytes, shapes and types of arrays, 64 hex digits."""
+    """Hash of the bytes, shapes and types of arrays, as 64 hex digits."""
     digest = hashlib.sha256()
     for array in arrays:
         digest.update(f"{array.dtype.str}{array.shape}".encode())
@@ -78,28 +78,28 @@ def fingerprint(*arrays: NDArray[Any]) -> str:
 
 
 def diagonal(points: Floats) -> float:
-    """The diagonal [mm] of the box around ``points`` (n, 3): the size of a body."""
+    """Diagonal [mm] of the bounding box of ``points`` (n, 3), used as the size of a body."""
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def place_of(point: Iterable[float]) -> str:
-    """A point (3,) [mm] as messages show it."""
+    """Format a point (3,) [mm] for a message."""
     x, y, z = point
     return f"({x:.1f}, {y:.1f}, {z:.1f}) mm"
 
 
 def edge_vectors(corners: Floats) -> Floats:
-    """Edges (m, 3, c - 1) from the first of the ``corners`` (m, c, 3) of cells to the others, as columns."""
+    """Edge vectors (m, 3, c - 1), as columns, from the first of the ``corners`` (m, c, 3) of each cell to its other corners."""
     return np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
 
 
 def normals(corners: Floats) -> Floats:
-    """Normals (m, 3) of triangles with ``corners`` (m, 3, 3), of length twice the area."""
+    """Normals (m, 3) of triangles with ``corners`` (m, 3, 3); the length of a normal is twice the area of the triangle."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def unit_normals(corners: Floats) -> Floats:
-    """Unit normals (m, 3) of triangles with ``corners`` (m, 3, 3); zero if they have no area."""
+    """Unit normals (m, 3) of triangles with ``corners`` (m, 3, 3); zero for a triangle without area."""
     found = normals(corners)
     lengths = np.linalg.norm(found, axis=1, keepdims=True)
     return np.asarray(np.divide(found, lengths, out=np.zeros_like(found), where=lengths > 0))
@@ -111,35 +111,35 @@ def corner_areas(corners: Floats) -> Floats:
 
 
 def triangle_areas(points: Floats, triangles: Ints) -> Floats:
-    """Area of each of the ``triangles`` (m, 3) between ``points`` (n, 3) [mm], (m,) [mm2]."""
+    """Areas (m,) [mm2] of ``triangles`` (m, 3) with vertices ``points`` (n, 3) [mm]."""
     return corner_areas(points[triangles])
 
 
 def vertex_areas(points: Floats, triangles: Ints) -> Floats:
-    """A third of the area of the ``triangles`` (m, 3) around each of the ``points`` (n, 3) [mm], (n,) [mm2]."""
+    """Areas (n,) [mm2] of the ``points`` (n, 3) [mm]: a third of the total area of the ``triangles`` (m, 3) around each point."""
     thirds = np.repeat(triangle_areas(points, triangles) / 3, 3)
     return np.bincount(triangles.ravel(), weights=thirds, minlength=len(points))
 
 
 def tet_volumes(points: Floats, tets: Ints) -> Floats:
-    """Signed volume of each of the ``tets`` (k, 4) between ``points`` (n, 3) [mm], (k,) [mm3]."""
+    """Signed volumes (k,) [mm3] of ``tets`` (k, 4) with vertices ``points`` (n, 3) [mm]."""
     a, b, c, d = (points[tets[:, corner]] for corner in range(4))
     return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6)
 
 
 def upright(points: Floats, tets: Ints) -> Ints:
-    """The ``tets`` (k, 4) between ``points`` (n, 3), with two corners exchanged in each tet of negative volume."""
+    """Return the ``tets`` (k, 4) on ``points`` (n, 3) with two vertices swapped in each tet that has a negative volume."""
     return np.where((tet_volumes(points, tets) < 0)[:, None], tets[:, [0, 2, 1, 3]], tets)
 
 
 def tet_qualities(points: Floats, tets: Ints) -> Floats:
-    """Mean-ratio quality (k,) of ``tets`` (k, 4) between ``points`` (n, 3): 1 if regular, 0 if flat (Liu and Joe 1994)."""
+    """Mean-ratio quality (k,) of ``tets`` (k, 4) with vertices ``points`` (n, 3): 1 if regular, 0 if flat (Liu and Joe 1994)."""
     squares = sum(np.sum((points[tets[:, i]] - points[tets[:, j]]) ** 2, axis=1) for i in range(4) for j in range(i))
     return np.asarray(12 * np.cbrt(3 * np.abs(tet_volumes(points, tets))) ** 2 / squares)
 
 
 def boundary(tets: Ints) -> tuple[Ints, Ints]:
-    """The triangles (m, 3) that belong to only one of the ``tets`` (k, 4), outward, and this tet (m,) for each."""
+    """Return the outward triangles (m, 3) that belong to only one of the ``tets`` (k, 4), and the index (m,) of that tet."""
     faces = tets[:, TET_FACES].reshape(-1, 3)
     found = distinct(np.sort(faces, axis=1))
     alone = np.sort(found.first[found.counts == 1])
@@ -147,25 +147,25 @@ def boundary(tets: Ints) -> tuple[Ints, Ints]:
 
 
 def sorted_corners(facets: Ints) -> list[tuple[int, ...]]:
-    """The corners of each of the ``facets`` (m, k) in ascending order, which are the same for the same facet."""
+    """Return the corners of each of the ``facets`` (m, k) in ascending order, so that equal facets have equal tuples."""
     return list(map(tuple, np.sort(facets, axis=1).tolist()))
 
 
 def found_in(facets: Ints, others: Ints) -> Bools:
-    """True (m,) for each of the ``facets`` (m, k) that has the corners of one of ``others`` (n, k), in any order."""
+    """Mask (m,) of the ``facets`` (m, k) that have the same corners as one of ``others`` (n, k), in any order."""
     known = set(sorted_corners(others))
     return np.array([one in known for one in sorted_corners(facets)], bool)
 
 
 def united(parts: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
-    """The points (n, d) and cells (m, k) of all ``parts`` together; the given cells of a part refer to the points of this part."""
+    """Join ``parts``, pairs of points and of cells that index these points, into the points (n, d) and cells (m, k) of one mesh."""
     starts = np.cumsum([0, *(len(points) for points, _ in parts)])
     cells = [own + start for (_, own), start in zip(parts, starts, strict=False)]
     return np.concatenate([points for points, _ in parts]), np.concatenate(cells)
 
 
 def check_finite(surface: Surface) -> None:
-    """Raise InputError if there are no triangles, a point is not finite, or a triangle has a vertex that does not exist."""
+    """Raise InputError for a surface without triangles, with points not finite or too far away, or with invalid triangles."""
     if len(surface.triangles) == 0:
         raise InputError(surface.place, "no triangles", "a triangle surface")
     bad = np.flatnonzero(~np.isfinite(surface.points).all(axis=1))
@@ -179,16 +179,17 @@ def check_finite(surface: Surface) -> None:
 
 
 def check_corners(surface: Surface) -> None:
-    """Raise InputError if a triangle has a vertex that does not exist."""
+    """Raise InputError if a triangle refers to a vertex that does not exist."""
     if surface.triangles.min(initial=0) < 0 or surface.triangles.max(initial=-1) >= len(surface.points):
         want = f"vertices from 0 to {len(surface.points) - 1}"
         raise InputError(surface.place, "a triangle with a vertex that does not exist", want)
 
 
 def check_closed(surface: Surface) -> Surface:
-    """The surface, outward, if it bounds one body: finite, closed, manifold and consistently oriented, with every point used.
+    """Return the surface, oriented outwards, if it bounds one body.
 
-    InputError otherwise, with the number of wrong edges, vertices or parts, and the position of the first or the smallest.
+    The surface must be finite, closed, manifold and consistently oriented, and use every point. Otherwise raises InputError with
+    the number of wrong edges, vertices or parts and the position of the first or the smallest.
     """
     check_finite(surface)
     points, triangles = surface.points, surface.triangles
@@ -214,27 +215,27 @@ def check_closed(surface: Surface) -> Surface:
 
 
 def twins(triangles: Ints) -> Ints:
-    """The two sides (e, 2) of each edge of a closed oriented surface; side 3 t + i starts at corner i of triangle t."""
+    """Return the two sides (e, 2) of each edge of a closed oriented surface. Side 3 t + i begins at corner i of triangle t."""
     ends = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     return np.lexsort(ends.T).reshape(-1, 2)
 
 
 def corner_fans(one: Ints, other: Ints, count: int) -> Ints:
-    """The number (count,) of the fan of each corner of triangles: corners around a vertex are in one fan if edges connect their
-    triangles. The sides ``one`` (e,) and ``other`` (e,) of each edge are numbered as in :func:`twins`.
+    """Index (count,) of the fan of each of ``count`` triangle corners. A fan consists of corners at one vertex whose triangles are
+    connected through edges. ``one`` (e,), ``other`` (e,): the two sides of each of these edges, numbered as in :func:`twins`.
     """
     after_one, after_other = (side - side % 3 + (side + 1) % 3 for side in (one, other))
     return connected_parts(np.concatenate([one, after_one]), np.concatenate([after_other, other]), count)
 
 
 def connected_parts(first: Ints, second: Ints, count: int) -> Ints:
-    """The number (count,) of the connected part of each of ``count`` nodes of a graph with edges ``first``, ``second`` (e,)."""
+    """Index (count,) of the connected part of each of ``count`` nodes; edges connect nodes ``first`` (e,) and ``second`` (e,)."""
     links = coo_array((np.ones(len(first), bool), (first, second)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
 
 
 def _check_parts(surface: Surface) -> None:
-    """Raise InputError if a closed oriented surface has a vertex with several fans of triangles, or several connected parts."""
+    """Raise InputError if a closed oriented surface has several connected parts, or a vertex with several fans of triangles."""
     one, other = twins(surface.triangles).T
     corners = surface.triangles.ravel()
     _, corner = np.unique(corner_fans(one, other, len(corners)), return_index=True)
@@ -252,7 +253,7 @@ def _check_parts(surface: Surface) -> None:
 
 
 def enclosed_volume(points: Floats, triangles: Ints) -> float:
-    """Volume inside a closed surface [mm3], by the divergence theorem about its centre; report eq. 5.18 with its 1/6.
+    """Volume [mm3] inside a closed surface, by the divergence theorem about the mean of its points (report eq. 5.18, with its 1/6).
 
     >>> tet = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> round(enclosed_volume(tet, TET_FACES), 12) == round(1 / 6, 12)
@@ -264,7 +265,7 @@ def enclosed_volume(points: Floats, triangles: Ints) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Polylines:
-    """Polylines, stored one after the other: ``points`` (n, 3) [mm]; line i is ``points[offsets[i]:offsets[i + 1]]``."""
+    """Polylines, stored one after another: ``points`` (n, 3) [mm]. Line i is ``points[offsets[i]:offsets[i + 1]]``."""
 
     points: Floats
     offsets: Ints
@@ -277,7 +278,7 @@ class Polylines:
         return len(self.offsets) - 1
 
     def lengths(self, points: Floats | None = None) -> Floats:
-        """Length of each line (len(self),) [mm], at rest or with its points moved to ``points`` (n, 3)."""
+        """Length (len(self),) [mm] of each line, at rest or with the points of the lines moved to ``points`` (n, 3)."""
         steps = np.linalg.norm(np.diff(self.points if points is None else points, axis=0), axis=1)
         along = np.concatenate([[0.0], np.cumsum(steps)])
         return np.asarray(along[self.offsets[1:] - 1] - along[self.offsets[:-1]])

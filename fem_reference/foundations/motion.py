@@ -1,4 +1,4 @@
-"""Rigid motion of a bone: frame number -> 4 x 4 pose, by an angle about a fixed axis or a distance along it, between keyframes."""
+"""Rigid motion of a bone: the 4 x 4 pose at each frame number, from rotation about a fixed axis or sliding along it."""
 
 from dataclasses import dataclass
 
@@ -6,16 +6,17 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats
 
-# Frame numbers between which a motion is steady (straight, or about one axis), and the angle [rad] of the rotation at each.
+# Frame numbers between which a motion is uniform (straight, or about one axis), and the rotation angle [rad] at each of them.
 Turning = tuple[tuple[float, ...], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
 class RigidMotion:
-    """Rotation about the line through ``centre`` [mm] along ``axis`` by ``amounts`` [rad] at ``frames``, or, without a centre,
-    sliding along the ``axis``, which may have any length, by ``amounts`` [mm]; linear in between.
+    """Motion of a bone between keyframes ``frames``, by linear interpolation of ``amounts``.
 
-    Before the first keyframe and after the last, the bone does not move. Right-handed: a positive angle about +x takes +y to +z.
+    The bone rotates about the line through ``centre`` [mm] along ``axis`` by ``amounts`` [rad] or, without a centre, slides along
+    ``axis``, which may have any length, by ``amounts`` [mm]. It does not move before the first keyframe and after the last.
+    Rotation is right-handed: a positive angle about +x takes +y to +z.
     """
 
     axis: tuple[float, float, float]
@@ -24,7 +25,7 @@ class RigidMotion:
     amounts: tuple[float, ...]
 
     def pose(self, frame: float) -> Floats:
-        """The 4 x 4 matrix that takes rest positions to positions at ``frame``.
+        """Matrix (4, 4) that maps rest positions to positions at ``frame``.
 
         >>> quarter = RigidMotion((1, 0, 0), (0, 0, 0), (0.0, 10.0), (0.0, np.pi / 2))
         >>> np.round(quarter.pose(10) @ [0, 1, 0, 1], 12).tolist()
@@ -45,14 +46,14 @@ class RigidMotion:
 
     @property
     def along(self) -> Floats:
-        """The unit vector (3,) of the axis."""
+        """Unit vector (3,) along the axis."""
         return np.asarray(self.axis, float) / np.linalg.norm(self.axis)
 
     def turning(self, points: Floats) -> Turning:  # noqa: ARG002
-        """The keyframes and their angles [rad], all 0 if the bone slides."""
+        """Return the keyframes and the rotation angles [rad] at them; all angles are 0 if the bone slides."""
         return self.frames, self.amounts if self.centre is not None else (0.0,) * len(self.frames)
 
 
 def apply(pose: Floats, points: Floats) -> Floats:
-    """``points`` (n, 3) [mm] moved by a ``pose`` (4, 4), (n, 3)."""
+    """Move ``points`` (n, 3) [mm] by a ``pose`` (4, 4); returns (n, 3)."""
     return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])

@@ -1,4 +1,4 @@
-"""Small C files, compiled once for this machine and kept."""
+"""Small C files, compiled once for the processor of this machine and stored."""
 
 import hashlib
 import os
@@ -14,7 +14,7 @@ from pathlib import Path
 
 @cache
 def machine() -> str:
-    """The kind of this processor, as a hash: code compiled for one kind may not run on another."""
+    """Hash of the type of this processor: code compiled for one type may not run on another."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
         known = next(line for line in lines if line.startswith(("flags", "Features")))
@@ -24,8 +24,9 @@ def machine() -> str:
 
 
 def library(source: Path, flags: Sequence[str], folder: Path) -> CDLL:
-    """The functions of a C file, compiled with ``flags`` and kept in a ``folder``; OSError without a compiler or the folder,
-    RuntimeError with the compiler's message if it cannot compile the file.
+    """Load the functions of a C file, which is compiled with ``flags`` unless ``folder`` already contains the result.
+
+    Raises OSError if there is no compiler or the folder cannot be used, and RuntimeError with the compiler's message if it fails.
     """
     compiler = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()
     key = hashlib.sha256("\n".join([source.read_text(encoding="utf-8"), *compiler, *flags, machine()]).encode())
@@ -38,5 +39,5 @@ def library(source: Path, flags: Sequence[str], folder: Path) -> CDLL:
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             if done.returncode:
                 raise RuntimeError(f"{command[0]} cannot compile {source}: {done.stderr.strip()}")
-            made.replace(kept)  # atomic, even if several processes compile the file
+            made.replace(kept)  # atomic, so that several processes may compile the file at the same time
     return CDLL(str(kept))

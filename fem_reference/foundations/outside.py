@@ -1,4 +1,4 @@
-"""Effects of users: files outside the package, in the folders that the setting FEM_REFERENCE_EFFECTS lists."""
+"""Effects written by users: files outside the package, in the folders listed in the environment variable FEM_REFERENCE_EFFECTS."""
 
 import os
 from functools import cache
@@ -13,13 +13,15 @@ _PACKAGE = Path(__file__).resolve().parent.parent
 
 
 def folders() -> list[str]:
-    """The folders that the setting lists, separated as in PATH."""
+    """Folders listed in the environment variable, separated as in PATH."""
     return [str(Path(folder).absolute()) for folder in os.environ.get(SETTING, "").split(os.pathsep) if folder]
 
 
 @cache
 def only_record(module: ModuleType, places: tuple[str, ...], kinds: tuple[type[Record], ...]) -> type[Record]:
-    """The only record of ``kinds`` in a ``module``; InputError if it has none or several, or its name is in several ``places``."""
+    """Return the only class in ``module`` that is a subclass of one of ``kinds``. Raises InputError if there are no or several such
+    classes, or if modules with this name are in several of the folders ``places``.
+    """
     name = module.__name__.rpartition(".")[2]
     found = [place for place in places if (Path(place) / f"{name}.py").is_file()]
     if len(found) > 1:
@@ -32,6 +34,6 @@ def only_record(module: ModuleType, places: tuple[str, ...], kinds: tuple[type[R
 
 
 def source(module: ModuleType) -> bytes:
-    """The content of the file of a ``module`` outside the package; empty for a module inside, whose code is hashed elsewhere."""
+    """Content of the file of a ``module`` outside the package; empty for a module of the package, which is hashed elsewhere."""
     file = Path(str(module.__file__)).resolve()
     return b"" if file.is_relative_to(_PACKAGE) else file.read_bytes()

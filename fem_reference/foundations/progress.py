@@ -1,4 +1,4 @@
-"""The package's lines of progress, passed to a function of the caller."""
+"""Delivery of the package's progress messages to a function of the caller."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -12,8 +12,9 @@ Progress = Callable[[str], object]
 
 @contextmanager
 def reported(progress: Progress | None) -> Iterator[None]:
-    """A context in which each line of progress goes to ``progress``, one at a time, from any thread; InputError unless it is
-    callable or None.
+    """Context in which each line of progress, from any thread, is passed to ``progress``, one line at a time.
+
+    Raises InputError unless ``progress`` is callable or None.
     """
     if progress is None:
         yield
@@ -32,7 +33,7 @@ def reported(progress: Progress | None) -> Iterator[None]:
 
 
 class _Calling(logging.Handler):
-    """Calls a function with each line."""
+    """Logging handler that calls a function with each line."""
 
     def __init__(self, progress: Progress) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Strict frozen records read from TOML: an unknown key, a missing key or a wrong value is one InputError that names it."""
+"""Strict frozen records read from TOML. Unknown keys, missing keys and wrong values are reported together in one InputError."""
 
 import math
 import re
@@ -14,7 +14,7 @@ from fem_reference.foundations.errors import InputError
 
 
 class Record(BaseModel):
-    """A frozen record whose keys are all known, whose values have the declared types, and whose numbers are finite.
+    """A frozen record that accepts only known keys, values of the declared types, and finite numbers.
 
     Text and Boolean values are not accepted as numbers; an integer is accepted as a float.
     """
@@ -25,7 +25,7 @@ class Record(BaseModel):
 
 
 def rule(holds: Callable[[Any], object], want: str) -> Any:
-    """A check of a record: an error with the text ``want`` unless ``holds`` is true for the record."""
+    """Create a check of a record: an error with the text ``want`` unless ``holds`` is true for the record."""
 
     def check(record: Any) -> Any:
         if not holds(record):
@@ -36,7 +36,7 @@ def rule(holds: Callable[[Any], object], want: str) -> Any:
 
 
 def key_rule(key: str, holds: Callable[[Any, dict[str, Any]], object], want: str) -> Any:
-    """A check of a ``key`` of a record, like :func:`rule`; ``holds`` takes its value, and the earlier values by key."""
+    """Create a check of a ``key`` of a record, like :func:`rule`; ``holds`` takes its value and the values of earlier keys."""
 
     def check(value: Any, info: Any) -> Any:
         if not holds(value, info.data):
@@ -47,27 +47,27 @@ def key_rule(key: str, holds: Callable[[Any, dict[str, Any]], object], want: str
 
 
 def one_of(*keys: str) -> Any:
-    """A check of a record: exactly one of its ``keys`` has a value."""
+    """Create a check that exactly one of the ``keys`` of a record has a value."""
     named = (" and " if len(keys) == 2 else ", ").join(f'"{key}"' for key in keys)
     return rule(lambda one: sum(getattr(one, key) is not None for key in keys) == 1, f"exactly one of {named}")
 
 
 def increasing(values: Sequence[float] | None, want: str) -> Any:
-    """The ``values``, if there are any; ValueError unless each is above the one before."""
+    """Return the ``values``, which may be None; ValueError unless each value is larger than the one before it."""
     if values is not None and any(late <= early for early, late in pairwise(values)):
         raise ValueError(want)
     return values
 
 
 def directed(vector: tuple[float, float, float], name: str) -> tuple[float, float, float]:
-    """The ``vector``; ValueError, with its ``name``, unless its length is from 1e-9 to 1e9."""
+    """Return the ``vector``; ValueError, with its ``name``, unless the length of the vector is between 1e-9 and 1e9."""
     if not 1e-9 < math.hypot(*vector) < 1e9:
         raise ValueError(f"{name} that is not zero, with a length from 1e-9 to 1e9")
     return vector
 
 
 def check_name(name: str) -> str:
-    """The ``name``; ValueError if it cannot be a name."""
+    """Return the ``name``; ValueError if it is not a valid name."""
     if not name.isprintable() or name != name.strip() or not 0 < len(name) <= _LONGEST_NAME:
         raise ValueError(f"a name of 1 to {_LONGEST_NAME} letters, digits and punctuation, with no blank at either end")
     return name
@@ -93,44 +93,44 @@ def check_once(names: Sequence[str], place: str) -> None:
 
 
 def check_used(known: Sequence[str], uses: Sequence[tuple[str, str]], place: str) -> None:
-    """Raise InputError if one of the ``uses``, (key, name) each, has a name that is not ``known``."""
+    """Raise InputError if a name in ``uses``, which are pairs (key, name), is not ``known``."""
     for key, name in uses:
         if name not in known:
             want = f"one of {', '.join(known)}" if known else "none, as none is defined"
             raise InputError(join(place, key), f'"{name}"', want)
 
 
-_SHOWN = 12  # the maximum number of errors that are shown for a file
+_SHOWN = 12  # the maximum number of further errors that are shown for a file
 _LONGEST_NAME = 100
-# A name in pages and messages.
+# A name for pages and messages.
 Name = Annotated[str, AfterValidator(check_name)]
-# A name that is also valid for a file or folder.
+# A name that can also be the name of a file or folder.
 FileName = Annotated[str, AfterValidator(_check_file_name)]
-# A name that is valid for a folder and, followed by a dot, begins names of scalars.
+# A name that can be the name of a folder and, followed by a dot, the first part of the name of a scalar.
 PartName = Annotated[str, AfterValidator(_check_part_name)]
 
 
 def parse[R](record: type[R], table: object, place: str) -> R:
-    """``table`` as a ``record`` or dataclass, whose keys are reported below ``place``, for example ``"case.toml: effect[0]"``."""
+    """Convert ``table`` to a ``record`` or dataclass; errors name keys below ``place``, for example ``"case.toml: effect[0]"``."""
     try:
         strict = issubclass(record, Record)
         return TypeAdapter(record).validate_python(_turned(table, list, tuple) if strict else table)
     except RecursionError as error:
         raise InputError(place, "tables that are nested too deeply", "the keys of a file") from error
     except ValidationError as error:
-        # Unknown keys come first: naming a mistyped key helps more than reporting that the intended key is missing.
+        # Unknown keys come first: a message about a mistyped key helps more than one about the missing key that was intended.
         wrong = sorted(_own(error.errors()), key=lambda one: one["type"] != "extra_forbidden")
         raise together([_as_input_error(one, record, place, table) for one in wrong]) from None
 
 
 def _own(errors: Sequence[Any]) -> list[Any]:
-    """``errors`` without lists that are too short only because their entries are wrong."""
+    """Leave out errors of lists that are too short only because some of their entries are wrong."""
     inside = {one["loc"][:i] for one in errors for i in range(len(one["loc"]))}
     return [one for one in errors if one["type"] != "too_short" or one["loc"] not in inside]
 
 
 def together(wrong: Sequence[InputError]) -> InputError:
-    """One error that lists all errors ``wrong``, at most one for each key, at the place of the first."""
+    """Combine the errors ``wrong`` into one error at the place of the first of them, with at most one error for each key."""
     places = {str(one.place): one for one in reversed(wrong)}
     first, *others = sorted(places.values(), key=wrong.index)
     if not others:
@@ -141,14 +141,14 @@ def together(wrong: Sequence[InputError]) -> InputError:
 
 
 def _turned(value: Any, kind: type[Sequence[Any]], into: Callable[[Iterator[Any]], Any]) -> Any:
-    """A ``value`` of a file with all sequences of a ``kind`` (lists of files or tuples of records) converted by ``into``."""
+    """Convert all sequences of type ``kind`` (lists from files, or tuples of records) in a ``value`` with the function ``into``."""
     if isinstance(value, dict):
         return {key: _turned(inside, kind, into) for key, inside in value.items()}
     return into(_turned(inside, kind, into) for inside in value) if isinstance(value, kind) else value
 
 
 def join(place: str, key: str) -> str:
-    """``place`` with ``key`` below it: after a colon if the place is a file, after a dot if it is a key."""
+    """Append ``key`` to ``place``: after a colon if the place is a file, after a dot if it is a key."""
     return place if not key else f"{place}{': ' if place.endswith(('.toml', '.json')) else '.'}{key}"
 
 
@@ -168,20 +168,20 @@ def _as_input_error(first: Any, record: type, place: str, table: object) -> Inpu
 
 
 def _keys(table: object, path: tuple[int | str, ...]) -> tuple[int | str, ...]:
-    """The part of ``path`` inside tables and lists; pydantic adds the names of types where several are allowed."""
+    """Shorten ``path`` to the keys and indices of ``table``; pydantic adds names of types where several are allowed."""
     inside: Any = table
     for i, part in enumerate(path):
         if not hasattr(inside, "__getitem__") or isinstance(inside, str):
             return path[:i]
         try:
             inside = inside[part]
-        except (KeyError, IndexError, TypeError):  # a missing key belongs to the path
+        except (KeyError, IndexError, TypeError):  # a missing key is part of the path
             return path
     return path
 
 
 def _known(record: Any, path: tuple[int | str, ...]) -> list[str]:
-    """The keys, in files, of the record to which ``path`` leads (a list index stays in the same record)."""
+    """Keys, as written in files, of the record to which ``path`` leads (a list index stays in the same record)."""
     for part in path:
         if isinstance(part, str) and part in getattr(record, "model_fields", {}):
             record = _record_inside(record.model_fields[part].annotation)
@@ -189,7 +189,7 @@ def _known(record: Any, path: tuple[int | str, ...]) -> list[str]:
 
 
 def keys(record: Any) -> list[str]:
-    """The keys of a ``record`` in files; none if it is not a record."""
+    """Keys of a ``record`` class, as written in files; empty if it is not a record."""
     fields = getattr(record, "model_fields", {})
     return sorted(field.alias or name for name, field in fields.items() if not field.exclude)
 

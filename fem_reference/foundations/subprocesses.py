@@ -1,6 +1,6 @@
-"""Python subprocesses: their start and end, the resources that they use, and folders that they share.
+"""Python subprocesses: starting and ending them, measuring their use of resources, and sharing folders with them.
 
-They import this copy of the package, and nothing from the folder in which they are started.
+Subprocesses import this copy of the package, and nothing from the folder in which they are started.
 """
 
 import math
@@ -21,24 +21,24 @@ from filelock import FileLock, Timeout
 _STARTER = "FEM_REFERENCE_STARTER"
 _ROOT = Path(__file__).resolve().parent.parent.parent
 _PREFIX, _LOCK = "fem_reference_scratch-", ".lock"
-# The age [s] above which a folder with a free lock counts as abandoned, not as about to be locked.
+# The age [s] above which a folder that nobody has locked is considered abandoned. A younger one may be about to be locked.
 _SETTLED = 60.0
 
 
 def command(*words: str) -> list[str]:
-    """The command line of a Python that ignores modules in its working directory, followed by ``words``."""
+    """Command line that starts Python, ignoring modules in the working directory, with the arguments ``words``."""
     return [sys.executable, "-P", *words]
 
 
 def environment(**settings: str) -> dict[str, str]:
-    """The environment of this process, with this copy of the package before any other, and with ``settings``."""
+    """Environment of this process with this copy of the package first on the import path, and with the additional ``settings``."""
     theirs = [str(Path(path).absolute()) for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path]
     paths = [str(_ROOT), *theirs]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), _STARTER: str(os.getpid()), **settings}
 
 
 def end_with_starter() -> None:
-    """End this process a second or two after the process that started it, directly or not, even if that process is killed."""
+    """End this process within about two seconds after the process that started it, directly or not, even if that one was killed."""
     starter = os.environ.get(_STARTER)
     if starter is not None:
         threading.Thread(target=_watch, args=(int(starter),), daemon=True).start()
@@ -51,7 +51,7 @@ def _watch(process: int) -> None:
 
 
 def lives(process: int) -> bool:
-    """True for a process that runs; a zombie does not."""
+    """True if a process is running; False for a zombie."""
     try:
         os.kill(process, 0)
         return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
@@ -62,14 +62,14 @@ def lives(process: int) -> bool:
 
 
 def forget_peak_memory() -> None:
-    """Measure the peak memory of this process from now on, if the system supports this (Linux)."""
+    """Restart the measurement of the peak memory of this process, if the system supports this (Linux)."""
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
 
 
 def processor_times(process: int, *, of_ended: bool = False) -> dict[int, float]:
-    """Processor times [s] by process number, of a ``process`` and its running descendants; with ``of_ended``, each includes the
-    times of ended subprocesses for which it has waited. Empty if the system does not report them.
+    """Processor times [s] of a ``process`` and its running descendants, by process number; empty if the system does not report
+    times. With ``of_ended``, the time of a process includes the times of ended subprocesses for which it has waited.
     """
     parents, times = dict[int, int](), dict[int, float]()
     for folder in Path("/proc").glob("[0-9]*"):
@@ -86,8 +86,8 @@ def processor_times(process: int, *, of_ended: bool = False) -> dict[int, float]
 
 
 class MachineTime(NamedTuple):
-    """A moment: the clock time [s], the processor time [s] of this process and its descendants, and the processor time of
-    all processes on the machine, NaN if the system does not report it.
+    """Readings of clocks at one moment: the clock time ``seconds`` [s], the processor time ``ours`` [s] of this process and its
+    descendants, and the processor time ``all`` [s] of all processes on the machine, NaN if the system does not report it.
     """
 
     seconds: float
@@ -96,7 +96,7 @@ class MachineTime(NamedTuple):
 
     @classmethod
     def now(cls) -> Self:
-        """This moment."""
+        """Read the clocks."""
         busy = math.nan
         with suppress(OSError, ValueError):
             user, nice, system, _, _, *interrupts = map(
@@ -106,7 +106,7 @@ class MachineTime(NamedTuple):
         return cls(time.perf_counter(), sum(processor_times(os.getpid(), of_ended=True).values()), busy)
 
     def load(self) -> float | None:
-        """The fraction of the machine that other processes have used since this moment, None if the system does not report it."""
+        """Fraction of the machine that other processes have used since this moment; None if the system does not report it."""
         now = MachineTime.now()
         capacity = (now.seconds - self.seconds) * (os.cpu_count() or 1)
         share = (now.all - self.all - (now.ours - self.ours)) / capacity if capacity > 0 else math.nan
@@ -114,14 +114,14 @@ class MachineTime(NamedTuple):
 
 
 def spent_since(before: MachineTime) -> dict[str, str]:
-    """The processor time of this process since a moment and the load by other processes, as provenance of clock times."""
+    """Processor time of this process since ``before`` and load by other processes, as provenance of measured clock times."""
     ours, load = MachineTime.now().ours - before.ours, before.load()
     found = {"processor time": f"{ours:.1f} s"}
     return found if load is None else found | {"load by other processes": f"{100 * load:.0f} % of the machine"}
 
 
 def peak_memory(process: int | None = None) -> float:
-    """The peak memory [MB] since :func:`forget_peak_memory` or the start; of another ``process``, 0 if it is not reported."""
+    """Peak memory [MB] since :func:`forget_peak_memory` or the start, of this or another ``process`` (0 if unavailable)."""
     with suppress(OSError, StopIteration):
         lines = Path(f"/proc/{process or 'self'}/status").read_text(encoding="utf-8").splitlines()
         return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
@@ -130,14 +130,14 @@ def peak_memory(process: int | None = None) -> float:
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """A folder in the system's temporary folder, locked until it is removed or this process ends."""
+    """Context with a new folder in the system's temporary folder, which is locked until it is removed or this process ends."""
     _clear(Path(tempfile.gettempdir()))
     with tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True) as name, FileLock(Path(name) / _LOCK):
         yield Path(name)
 
 
 def _clear(root: Path) -> None:
-    """Remove folders that killed processes left behind; folders that cannot be removed stay."""
+    """Remove folders that killed processes have left behind; folders that cannot be removed remain."""
     for path in root.glob(f"{_PREFIX}*"):
         with suppress(OSError, Timeout):
             if time.time() - path.stat().st_mtime > _SETTLED and (path / _LOCK).is_file():

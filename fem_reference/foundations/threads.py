@@ -1,23 +1,27 @@
-"""Threads that work on several items at a time, each item with a value of its own, such as a process, and what they make alone."""
+"""Threads that work on several items at a time, each with a resource such as a process, and code that one thread runs at a time."""
 
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, CancelledError, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack
-from functools import cache
 from queue import SimpleQueue
 
-# Files in caches and filters of warnings are those of the process: what uses them is made by one thread at a time.
+# Cached files and warning filters are shared by the process, so functions that use them are run by one thread at a time.
 _MAKING = threading.RLock()
 
 
 def made_once[T](make: Callable[[], T]) -> Callable[[], T]:
-    """A function that returns the result of ``make``, called when it is first needed, while no other thread makes anything."""
+    """Return a function that calls ``make`` when it is first called and returns that result from then on, in every thread. Only one
+    thread calls any ``make`` at a time.
+    """
+    results: list[T] = []
 
-    @cache
     def made() -> T:
-        with _MAKING:
-            return make()
+        if not results:
+            with _MAKING:
+                if not results:  # another thread may have finished meanwhile
+                    results.append(make())
+        return results[0]
 
     return made
 
@@ -28,9 +32,11 @@ def in_threads[T, R, A](
     contexts: Sequence[Callable[[], AbstractContextManager[A]]],
     ending: Callable[[], object] = lambda: None,
 ) -> tuple[R, ...]:
-    """The results of ``work`` on the ``items``, in their order, on as many at a time as there are ``contexts``, each with the value
-    of a context that no other uses. The contexts are closed even after an error or an interrupt: before that ``ending`` is called,
-    and no more work begins. The first error of ``work`` is raised.
+    """Return the results of ``work`` on each of ``items``, in their order. ``work`` takes an item and the value of one of
+    ``contexts``; as many items are worked on at a time as there are contexts, and no two of them share a context.
+
+    The contexts are closed even after an error or an interrupt; before that, ``ending`` is called, and no further work begins. The
+    first error of ``work`` is raised.
     """
     free, errors = SimpleQueue[A](), list[BaseException]()
 

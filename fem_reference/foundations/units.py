@@ -1,6 +1,6 @@
-"""Conversion of text with a unit to a number in mm, N, MPa, s, rad, tonne; no other module handles units as text.
+"""Conversion of text with a unit to numbers in mm, N, MPa, s, rad and tonne; no other module handles units as text.
 
-Scene records consist of the annotated types: a field of type ``Pressure`` takes ``"30 kPa"`` and stores 0.03.
+Scene records use the annotated types: a field of type ``Pressure`` accepts ``"30 kPa"`` and stores 0.03.
 """
 
 import math
@@ -15,14 +15,15 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator, TypeAdapter
 
-# The allowed units [mm] of coordinates in a file: in scenes, next to frames and on the command line. Quantities with a number may
-# have any unit of their kind; for coordinates a slip such as "Mm", 1e9 mm, would not be noticed.
+# The allowed units [mm] of coordinates in files, in scenes, with frames and on the command line. A quantity that is written with
+# its unit may have any unit of its kind; for coordinates a slip such as "Mm", 1e9 mm, would go unnoticed.
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft": 304.8}
 
 
 class Kind(NamedTuple):
-    """A kind of quantity: its internal ``unit``, ``examples`` of one and of three values in a file, and the ``greatest`` accepted
-    magnitude, far above real values. ``written``: for a kind without a unit, the texts accepted instead of a unit.
+    """A kind of quantity. ``unit``: its internal unit; ``examples``: one value, and three values, as written in a file;
+    ``greatest``: the maximum accepted magnitude, far above realistic values; ``written``: for a kind without a unit, the texts
+    accepted as a unit.
     """
 
     unit: str
@@ -32,35 +33,35 @@ class Kind(NamedTuple):
 
 
 _FILE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-# The kinds by name, and the number of internal units in a common unit, by the common and the internal unit.
+# The kinds, by name, and the conversion factors of common units, by the common unit and the internal unit.
 KINDS = TypeAdapter(dict[str, Kind]).validate_python(_FILE["kind"])
 COMMON: dict[tuple[str, str], float] = {
     (unit, inside): factor for inside, units in _FILE["common"].items() for unit, factor in units.items()
 }
 _ONE_BY_ONE = threading.Lock()
-# A number, then possibly a unit.
+# A number, followed by an optional unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
-# Forbidden in a unit: an exponent that is not an integer of one or two digits, or that has an exponent itself, as in mm^9^9^9.
+# Forbidden in a unit: an exponent that is not an integer of one or two digits, or that has itself an exponent, as in mm^9^9^9.
 _NO_UNIT = re.compile(r"(?:\^|\*\*)(?!\s*[+-]?\d{1,2}(?![\w.])(?!\s*(?:\^|\*\*)))", re.ASCII)
 # The maximum number of characters in a quantity.
 _LONGEST = 100
-# The smallest accepted quantity above zero, in its internal unit.
+# The smallest accepted positive quantity, in its internal unit.
 _SMALLEST = 1e-30
-# The place of an exponent that follows a unit without a sign, as in m3.
+# The position before an exponent that directly follows a unit, as in m3.
 _EXPONENT = re.compile(r"(?<=[A-Za-z])(?=[23](?!\w))")
 
 
 @cache
 def _registry() -> Any:
-    import pint  # imported here, as it takes 0.4 s, which is saved if only common units occur
+    import pint  # imported here because it takes 0.4 s, which is saved if only common units occur
 
     return pint.UnitRegistry(cache_folder=None)
 
 
 def quantity(text: object, kind: str) -> float:
-    """Read ``text``, a number followed by its unit, as a quantity of ``kind`` (``"a pressure"``); ValueError if it is not.
+    """Convert ``text``, a number followed by its unit, to a quantity of ``kind`` (``"a pressure"``); ValueError if it is not one.
 
-    A fraction is in per cent or has no unit.
+    A fraction is written in per cent or without a unit.
 
     >>> quantity("30 kPa", "a pressure"), quantity("2 cm", "a length"), quantity("0.5 %", "a fraction")
     (0.03, 20.0, 0.005)
@@ -84,26 +85,26 @@ def quantity(text: object, kind: str) -> float:
 
 @cache
 def _factor(unit: str, inside: str) -> float:
-    """The number of units ``inside`` in one ``unit``; an error of pint, or NaN, if the two are of different kinds."""
+    """Number of units ``inside`` in one ``unit``. If they are of different kinds, pint raises an error or the result is NaN."""
     if unit == inside or (unit, inside) in COMMON:
         return COMMON.get((unit, inside), 1.0)
-    with _ONE_BY_ONE:  # two threads would each build a registry, and quantities of two registries do not compare
+    with _ONE_BY_ONE:  # otherwise two threads could build a registry each, and pint cannot combine quantities of two
         registry = _registry()
         one = registry.Quantity(1.0, registry.parse_units(unit))
         factor = float(one.to(inside or "dimensionless").magnitude)
-        # For pint an angle has no dimension; only its root unit distinguishes it.
+        # In pint an angle has no dimension; only its root unit distinguishes it from a number.
         same = one.to_root_units().units == registry.Quantity(1.0, inside).to_root_units().units
     return factor if same else math.nan
 
 
 def _split(text: object) -> tuple[str, str]:
-    """Number and unit as text; both empty if ``text`` does not begin with a number."""
+    """Split ``text`` into a number and a unit, as texts; both are empty if ``text`` does not begin with a number."""
     match = _NUMBER_AND_UNIT.fullmatch(text) if isinstance(text, str) and len(text) <= _LONGEST else None
     return (match[1], match[2]) if match else ("", "")
 
 
 def three(text: object, kind: str) -> tuple[float, float, float]:
-    """Three quantities of ``kind`` that share one unit.
+    """Convert ``text`` to three quantities of ``kind`` with a common unit.
 
     >>> three("146, 238, -431 mm", "a length"), three("0, 6.25, 0 kPa", "a pressure")
     ((146.0, 238.0, -431.0), (0.0, 0.00625, 0.0))
@@ -119,14 +120,14 @@ def three(text: object, kind: str) -> tuple[float, float, float]:
 
 
 def length_unit(text: object) -> float:
-    """The length [mm] of a unit of coordinates, one of ``LENGTH_UNITS``: ``"m"`` -> 1000.0."""
+    """Length [mm] of a unit of coordinates, which must be one of ``LENGTH_UNITS``: ``"m"`` -> 1000.0."""
     if not isinstance(text, str) or text not in LENGTH_UNITS:
         raise ValueError(f"a unit of length: {', '.join(LENGTH_UNITS)}")
     return LENGTH_UNITS[text]
 
 
 def positive(text: object, kind: str) -> float:
-    """A :func:`quantity` above zero."""
+    """Convert ``text`` to a :func:`quantity` that must be above zero."""
     value = quantity(text, kind)
     if not value > 0:
         raise ValueError("more than zero")
@@ -156,7 +157,7 @@ LengthUnit = Annotated[float, BeforeValidator(length_unit)]
 
 
 def unit_of(metadata: Sequence[object]) -> str:
-    """The internal unit of a field with the ``metadata`` of a type of this module; empty if it has none.
+    """Internal unit of a field whose type, from this module, has the ``metadata``; empty if it has no unit.
 
     >>> unit_of(Density.__metadata__), unit_of(())
     ('tonne/mm^3', '')
@@ -166,18 +167,18 @@ def unit_of(metadata: Sequence[object]) -> str:
 
 
 def field_unit(field: Any) -> str:
-    """The internal unit of a ``field`` of a record, by its type or one of its types; empty if it has none."""
+    """Internal unit of a ``field`` of a record, from its type or from one of the types of a union; empty if it has no unit."""
     inside = (unit_of(getattr(kind, "__metadata__", ())) for kind in kinds(field.annotation))
     return unit_of(field.metadata) or next((unit for unit in inside if unit), "")
 
 
 def kinds(annotation: Any) -> list[Any]:
-    """A type and all types in it."""
+    """Return a type and all types that it contains."""
     return [annotation, *(kind for part in getattr(annotation, "__args__", ()) for kind in kinds(part))]
 
 
 def written(value: Any, unit: str) -> Any:
-    """A number, or three numbers, as text with the internal ``unit``; values without a unit, and texts, are unchanged.
+    """Write a number, or three numbers, as text with the internal ``unit``; return text, and values without a unit, unchanged.
 
     >>> written(0.01, "MPa"), written((0, 0, -1), "mm"), written("2 cm", "mm"), written(3, "")
     ('0.01 MPa', '0.0, 0.0, -1.0 mm', '2 cm', 3)

@@ -1,4 +1,4 @@
-"""The version of the package, which pages, files and stored runs state, and the versions of other packages."""
+"""Version of the package, which is stated in pages, files and stored runs, and versions of other packages."""
 
 import importlib.metadata
 from collections.abc import Iterable
@@ -8,7 +8,7 @@ __version__ = "0.1.0"
 
 
 def versions(packages: Iterable[str]) -> dict[str, str]:
-    """The versions of all installed ``packages``."""
+    """Versions of those ``packages`` that are installed, by name."""
     found = dict[str, str]()
     for package in packages:
         with suppress(importlib.metadata.PackageNotFoundError):

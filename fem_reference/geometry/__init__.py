@@ -1,1 +1,1 @@
-"""Geometry: distances, intersections, tetrahedra, attachments, embedding, fibres, extension."""
+"""Geometry of surfaces, tetrahedra and paths: distances, intersections, meshing, attachments, embedding, fibres and extension."""

@@ -1,6 +1,6 @@
 """Grids of boxes, each cut into the six Kuhn tetrahedra along the same diagonals, so that refined grids are nested.
 
-Each cell, and each of its faces, is cut along the diagonal from its lowest to its highest corner.
+Each cell and each of its faces is cut along the diagonal from its lowest to its highest corner.
 """
 
 from itertools import permutations
@@ -14,13 +14,13 @@ from fem_reference.geometry.tetrahedra import check_size
 
 Counts = tuple[int, int, int]
 
-_SAME = 1e-6  # tolerance relative to the largest edge: the rounding of single-precision coordinates
+_SAME = 1e-6  # tolerance relative to the longest edge of the box: the rounding of single-precision coordinates
 
 
 def fill(surface: Surface, size: float) -> TetMesh:
-    """The axis-aligned box bounded by the closed outward ``surface``, as a grid of boxes with edges of about ``size`` [mm].
+    """Fill the axis-aligned box bounded by the closed outward ``surface`` with a grid of boxes with edges of about ``size`` [mm].
 
-    InputError if ``surface`` does not bound such a box, or if ``size`` is far too small or too large.
+    Raises InputError if ``surface`` does not bound such a box, or if ``size`` is far too small or too large.
     """
     low, high = _extent(surface)
     check_size(surface, size)
@@ -30,7 +30,7 @@ def fill(surface: Surface, size: float) -> TetMesh:
 
 
 def kuhn(counts: Counts) -> tuple[Ints, Ints]:
-    """The nodes (n, 3) of a lattice of ``counts`` cells along x, y and z (z varies fastest), and the tets (k, 4) of its cells."""
+    """Return the nodes (n, 3) of a lattice of ``counts`` cells along x, y and z (z varies fastest), and the tets (k, 4)."""
     nodes = np.indices((counts[0] + 1, counts[1] + 1, counts[2] + 1)).reshape(3, -1).T
     strides = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
     lowest = np.indices(counts).reshape(3, -1).T @ strides
@@ -43,7 +43,7 @@ def kuhn(counts: Counts) -> tuple[Ints, Ints]:
 
 
 def lattice_skin(counts: Counts) -> tuple[Ints, Ints]:
-    """The nodes (n, 3) on the faces of a lattice of ``counts`` cells, and the outward triangles (m, 3) of the skin of its tets."""
+    """Return the nodes (n, 3) on the surface of a lattice of ``counts`` cells, and the surface's outward triangles (m, 3)."""
     sheets = [_sheet(counts, axis, end) for axis in range(3) for end in (0, 1)]
     corners = np.concatenate(sheets).reshape(-1, 3)
     found = distinct(corners)
@@ -51,7 +51,7 @@ def lattice_skin(counts: Counts) -> tuple[Ints, Ints]:
 
 
 def _sheet(counts: Counts, axis: int, end: int) -> Ints:
-    """The corners (m, 3, 3) of the outward triangles on the face of a lattice at the low or high ``end`` of an ``axis``."""
+    """Corners (m, 3, 3) of the outward triangles on the face of a lattice at the low (0) or high (1) ``end`` of an ``axis``."""
     one, other = (axis + 1) % 3, (axis + 2) % 3
     lowest = np.zeros((counts[one] * counts[other], 3), np.int64)
     lowest[:, [one, other]] = np.indices((counts[one], counts[other])).reshape(2, -1).T
@@ -62,7 +62,7 @@ def _sheet(counts: Counts, axis: int, end: int) -> Ints:
 
 
 def _extent(surface: Surface) -> tuple[Floats, Floats]:
-    """The lowest and the highest corner (3,) of an axis-aligned box with this ``surface``; InputError if it is not a box."""
+    """Return the lowest and the highest corner (3,) of the axis-aligned box bounded by ``surface``; InputError if it is no box."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     near = _SAME * float((high - low).max())
     corners = surface.points[surface.triangles]

@@ -1,4 +1,4 @@
-"""The distance from a point, in any direction, within which a tricubic spline on a grid stays above a level."""
+"""Lower bounds on the distance from a point within which a tricubic spline on a grid stays above a level."""
 
 from dataclasses import dataclass
 
@@ -8,15 +8,16 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats
 
-# Weights that give the four Bernstein coefficients of a cubic (rows) from the four B-spline coefficients of its cell.
+# The matrix that converts the four B-spline coefficients of a cubic in a cell to its four Bernstein coefficients (rows).
 _BERNSTEIN = np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6
 _CHUNK = 20_000  # the number of cells per chunk
 
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """``away`` (i, j, k): the distance [mm] from each node to the nearest cell in which the spline may fall to the level. The nodes
-    are ``spacing`` [mm] apart, the first at ``origin``; outside the grid the spline stays above the level.
+    """Clearance of points, tabulated at the nodes of a grid. ``away`` (i, j, k): the distance [mm] from each node to the nearest
+    cell in which the spline may be at or below the level. ``origin``: the position of the first node; ``spacing`` [mm]: the
+    distance between nodes. Outside the grid the spline is above the level.
     """
 
     away: Floats
@@ -24,7 +25,7 @@ class Clearance:
     spacing: float
 
     def __call__(self, points: Floats) -> Floats:
-        """A lower bound (n,) on the clearance [mm] of ``points`` (n, 3), at most 0 if none is certain; NaN for NaN coordinates."""
+        """Lower bound (n,) on the clearance [mm] of ``points`` (n, 3): 0 or less if none is certain, NaN for NaN coordinates."""
         at = (points - self.origin) / self.spacing
         known = np.isfinite(at).all(axis=1)
         at = np.where(known[:, None], at, 0.0)
@@ -32,13 +33,16 @@ class Clearance:
         nodes = np.rint(within).astype(np.int64)
         found = self.away[tuple(nodes.T)] - self.spacing * np.linalg.norm(within - nodes, axis=1)
         beyond = self.spacing * np.linalg.norm(at - within, axis=1)
-        # As the grid is convex, the segment to its nearest point is at 90 degrees or more to any segment from there into the grid.
+        # The grid is convex, so the segment from the point to the nearest point of the grid makes an angle of at least 90 degrees
+        # with any segment from there into the grid.
         found = np.where(beyond > 0, np.hypot(beyond, np.maximum(found, 0)), found)
         return np.where(known, found, np.nan)
 
 
 def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float) -> Clearance:
-    """The clearance of a spline with ``coefficients`` (i, j, k) of B-splines, defined between the second nodes from either end."""
+    """Clearance of the spline with B-spline ``coefficients`` (i, j, k), which is defined from the second to the last but one node
+    along each axis. ``origin``: the position of the first node; ``spacing`` [mm]: the distance between nodes.
+    """
     low = _may_be_low(coefficients, level)
     nodes = np.zeros(coefficients.shape, bool)
     for corner in np.ndindex(2, 2, 2):
@@ -50,9 +54,10 @@ def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float
 
 
 def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
-    """Mask of the cells, three fewer along each axis, in which a spline may be at ``level`` or below. In a cell, the least
-    of the 64 coefficients bounds the spline from below, and the least Bernstein coefficient does so more closely. The largest
-    coefficient bounds it from above, so cells deep inside need no check.
+    """Mask of the cells, three fewer than ``coefficients`` along each axis, in which a spline may be at or below ``level``.
+
+    In a cell, the smallest of the 64 coefficients is a lower bound of the spline, and the smallest Bernstein coefficient is a
+    closer bound. The largest coefficient is an upper bound, so cells that are entirely below the level need no closer check.
     """
     found = _least_of_four(coefficients) <= level
     cells = np.argwhere(found & (-_least_of_four(-coefficients) > level))
@@ -65,5 +70,5 @@ def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
 
 
 def _least_of_four(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The least of four consecutive values along each axis; the result is shorter by three along each."""
+    """Minimum of four consecutive values along each axis; the result is shorter than ``values`` by three along each axis."""
     return np.asarray(scipy.ndimage.minimum_filter(values, size=4)[(slice(2, -1),) * values.ndim])

@@ -1,4 +1,4 @@
-"""Coarsening of surfaces: a fine surface remeshed with fewer, well-shaped triangles."""
+"""Coarsening of surfaces: a fine surface is remeshed with fewer, well-shaped triangles."""
 
 import igl
 import numpy as np
@@ -8,22 +8,24 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volum
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.edges import Edges
 
-# Chosen by trials on four hip muscles and a box; more rounds bring no improvement.
+# Chosen by trials on four hip muscles and a box; more rounds do not improve the result.
 _ROUNDS = 6
-# A vertex may move along a direction if that direction has less than this fraction of the squared normals around the vertex:
-# the vertex then stays on its plane or sharp edge. Above 0.05 a thin rim shrinks; below 0.02 slivers remain.
+# A vertex may move along an eigenvector of its normal tensor (see ``_normal_tensors``) if the eigenvalue is below this fraction of
+# the sum of all three; it then stays on its plane or sharp edge. Above 0.05, thin rims shrink; below 0.02, slivers remain.
 _FREE = 0.03
-# Distance of the pole of inversion, in diagonals of the body: a nearer pole moves sharp edges, a farther one leaves parts flat.
+# The distance of the pole of inversion, in diagonals of the body. A nearer pole displaces sharp edges; with a farther one, flat
+# parts are not curved enough.
 _POLE = 6.0
 _NEARLY_FLAT = np.cos(np.radians(30))
 _TINY = np.finfo(float).tiny
 
 
 def coarsen(surface: Surface, count: int) -> Surface:
-    """A closed surface of about ``count`` triangles that approximates a closed ``surface`` and keeps its sharp edges and volume.
+    """Approximate a closed ``surface`` by one of about ``count`` triangles, with the same sharp edges and volume.
 
-    Edges collapse by quadric error (Garland and Heckbert 1997, doi 10.1145/258734.258849). Then edges flip towards a Delaunay
-    triangulation, vertices slide towards the middle of their neighbours, and each round moves them back onto ``surface``.
+    Edges are first collapsed by quadric error (Garland and Heckbert 1997, doi 10.1145/258734.258849). In each of the following
+    rounds, edges are flipped towards a Delaunay triangulation, vertices slide towards the centre of their neighbours, and vertices
+    are then projected onto ``surface``.
     """
     points, triangles = _collapse(surface, count)
     for _ in range(_ROUNDS):
@@ -34,8 +36,8 @@ def coarsen(surface: Surface, count: int) -> Surface:
 
 
 def resampled(surface: Surface, power: int) -> Surface:
-    """``surface`` with ``4**power`` times as many triangles. For positive ``power`` each triangle is cut into four, repeatedly; no
-    vertex moves, and old vertices come first. Otherwise the surface is coarsened.
+    """Return ``surface`` with ``4**power`` times as many triangles. If ``power`` is positive, each triangle is cut into four
+    ``power`` times; no vertex moves, and the old vertices come first. If it is negative, the surface is coarsened.
     """
     if power < 0:
         return coarsen(surface, max(4, round(len(surface.triangles) * 4**power)))
@@ -46,7 +48,9 @@ def resampled(surface: Surface, power: int) -> Surface:
 
 
 def _collapse(surface: Surface, count: int) -> tuple[Floats, Ints]:
-    """Points and triangles after quadric collapses of the inverted surface: the quadrics of a flat part would be singular."""
+    """Collapse edges by quadric error until about ``count`` triangles remain; returns the points and triangles. The surface is
+    first inverted in a sphere, because the quadrics of a flat part would be singular.
+    """
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     radius = _POLE * float(np.linalg.norm(high - low))
     pole = (low + high) / 2 + radius * np.array([0.48, 0.6, 0.64])
@@ -55,13 +59,15 @@ def _collapse(surface: Surface, count: int) -> tuple[Floats, Ints]:
 
 
 def _invert(points: Floats, pole: Floats, radius: float) -> Floats:
-    """``points`` (n, 3) inverted in the sphere of ``radius`` about ``pole``; a second inversion restores them."""
+    """Invert ``points`` (n, 3) in the sphere of ``radius`` about ``pole``; a second inversion restores them."""
     away = points - pole
     return np.asarray(pole + away * radius**2 / np.sum(away**2, axis=1, keepdims=True))
 
 
 def slide(points: Floats, triangles: Ints) -> Floats:
-    """``points`` (n, 3) [mm] moved to the area-weighted means of adjacent ``triangles`` (m, 3), along free directions only."""
+    """Move ``points`` (n, 3) [mm] to the area-weighted mean of the centroids of the ``triangles`` (m, 3) around them, but only
+    along the directions in which they are free (see :func:`free_part`).
+    """
     areas = triangle_areas(points, triangles)
     total = _around(areas, triangles, len(points))[:, None]
     pulled = _around(areas[:, None] * points[triangles].mean(axis=1), triangles, len(points))
@@ -70,9 +76,9 @@ def slide(points: Floats, triangles: Ints) -> Floats:
 
 
 def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> Floats:
-    """The part (k, 3) of displacements that stays on a surface: at a smooth point the tangential part, at a sharp edge the part
-    along the edge, at a corner 0. The surface has ``points`` (n, 3) [mm] and ``triangles`` (m, 3); its points ``chosen`` (k,) are
-    displaced by ``steps`` (k, 3) [mm].
+    """Part (k, 3) of the displacements ``steps`` (k, 3) [mm] of some points that keeps them on the surface: the tangential part at
+    a smooth point, the part along the edge at a sharp edge, and 0 at a corner. ``points`` (n, 3) [mm] and ``triangles`` (m, 3)
+    define the surface, and ``chosen`` (k,) are the indices of the displaced points.
     """
     shares, directions = np.linalg.eigh(_normal_tensors(points, triangles))
     free = shares < _FREE * shares.sum(axis=1, keepdims=True)
@@ -81,7 +87,7 @@ def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> F
 
 
 def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
-    """For each point, the sum (n, 3, 3) over the triangles around it of angle times ``n n^T``, with the unit normal n."""
+    """Sum (n, 3, 3) of ``n n^T`` for the triangles around each point, with unit normals n, weighted by the angles at the point."""
     across = unit_normals(points[triangles])
     squares = across[:, :, None] * across[:, None, :]
     tensors = np.zeros((len(points), 3, 3))
@@ -93,7 +99,7 @@ def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
 
 
 def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
-    """The ``points`` (n, 3) [mm] of a closed outward surface, moved equally along their normals to enclose a ``volume``."""
+    """Move the ``points`` (n, 3) [mm] of a closed outward surface equally along their normals, so that they enclose ``volume``."""
     for _ in range(3):
         across = _around(normals(points[triangles]), triangles, len(points))
         across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), _TINY)
@@ -103,8 +109,8 @@ def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
 
 
 def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> Ints:
-    """The triangles (m, 3) of a closed surface after edge flips towards a Delaunay triangulation (at most 20 passes).
-    Edges between triangles of different ``labels`` (m,) stay, so that the labels remain valid.
+    """Flip edges of a closed surface towards a Delaunay triangulation, in at most 20 passes; returns the new triangles (m, 3).
+    Edges between triangles with different ``labels`` (m,) are not flipped, so the labels remain valid.
     """
     for _ in range(20):
         flipped = _flip_once(points, triangles, labels)
@@ -115,7 +121,7 @@ def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> I
 
 
 def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
-    """The triangles after edge flips with a gain, the largest first, each triangle at most once; the same array without flips."""
+    """Flip edges in the order of their gain, each triangle at most once; returns ``triangles`` itself if no edge is flipped."""
     edges = Edges.of(Surface(points, triangles))
     gain = _flip_gain(points, edges)
     if labels is not None:
@@ -136,7 +142,7 @@ def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
 
 
 def _flip_gain(points: Floats, edges: Edges) -> Floats:
-    """The excess (e,) [rad] over pi of the sum of the angles opposite to each edge; 0 if a flip is useless or bends the surface."""
+    """Sum of the two angles opposite each edge, minus pi, (e,) [rad]; 0 if a flip would be useless or would bend the surface."""
     a, b, c, d = (points[corner] for corner in (*edges.ends.T, *edges.opposite.T))
     excess = _angle(a - c, b - c) + _angle(a - d, b - d) - np.pi
     before = _cosine(np.cross(b - a, c - a), np.cross(a - b, d - b))
@@ -146,7 +152,7 @@ def _flip_gain(points: Floats, edges: Edges) -> Floats:
 
 
 def _around(values: NDArray[np.float64], triangles: Ints, count: int) -> Floats:
-    """Sum of the ``values`` (m, ...) of the triangles around each of ``count`` points, (count, ...)."""
+    """Sum (count, ...) of the ``values`` (m, ...) of the triangles around each of ``count`` points."""
     total = np.zeros((count, *values.shape[1:]))
     for corner in triangles.T:
         np.add.at(total, corner, values)

@@ -1,6 +1,6 @@
-"""Sections of a muscle on which a field has a given value (isosurfaces), as triangles, each mapped to the unit square.
+"""Cross-sections of a muscle on which a field has a given value (isosurfaces), as triangles, each mapped to the unit square.
 
-Rims of consecutive sections are matched point by point, so a changing outline does not twist lines along the muscle.
+The rims of consecutive sections are matched point by point, so that a changing outline does not twist lines along the muscle.
 """
 
 from dataclasses import dataclass
@@ -12,22 +12,24 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, normals
 from fem_reference.foundations.rows import distinct
 
-# A point whose value is this close to the level counts as above it, so that no triangle has two corners at one point.
+# A point whose value is this close to the level counts as above it, so that no triangle has two coincident corners.
 _NUDGE = 1e-4
-# The unit square's boundary, counter-clockwise from the middle of its side x = 1, by fractions of its length.
+# Points on the boundary of the unit square, counter-clockwise: the midpoint of the side x = 1, the four corners, and the midpoint
+# again. Their positions along the boundary, as fractions of its length, and their x and y coordinates.
 _SHARES = (0, 1 / 8, 3 / 8, 5 / 8, 7 / 8, 1)
 _SQUARE = ((1, 1, 0, 0, 1, 1), (0.5, 1, 1, 0, 0, 0.5))
 _SAMPLES = 360  # the number of points on each rim that are matched
-_REACH = 60  # the number of samples by which a match may deviate from the common shift of the rim, either way
-_STEPS = (-1, 0, 1, 2, 3)  # numbers of samples by which consecutive matches may differ, so that matches stay in order
-_STIFFNESS = 0.01  # fraction of a rim's length: the distance of points that is as costly as stretching the rim to twice its length
+_REACH = 60  # the maximum deviation of a match from the common shift of the rims, in samples
+_STEPS = (-1, 0, 1, 2, 3)  # possible differences between consecutive matches, in samples, so that matches stay in order
+# The distance between matched points that costs as much as stretching the rim to twice its length, divided by the rim's length.
+_STIFFNESS = 0.01
 _WINDOW = 9  # the number of samples in the moving mean that smooths the matches
-_LEAST = 0.1  # the weight of the common shift in a match, so that no two points coincide
+_LEAST = 0.1  # the weight of the common shift in a match, which keeps matched points distinct
 
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
-    """Triangles (m, 3) between ``points`` (n, 3) [mm], in one piece without holes; ``normal`` (3,) is a unit vector."""
+    """A connected cross-section without holes: ``triangles`` (m, 3) of ``points`` (n, 3) [mm], and its unit ``normal`` (3,)."""
 
     points: Floats
     triangles: Ints
@@ -35,7 +37,7 @@ class CrossSection:
 
     @property
     def moments(self) -> tuple[Floats, Floats]:
-        """The centroid (3,) [mm], and the second moments (3, 3) [mm2] of area about it, divided by the area."""
+        """Return the centroid (3,) [mm], and the second moments of area (3, 3) [mm2] about it, divided by the area."""
         corners = self.points[self.triangles]
         areas = np.linalg.norm(normals(corners), axis=1) / 2
         centre = areas @ corners.mean(axis=1) / areas.sum()
@@ -45,17 +47,17 @@ class CrossSection:
 
     @cached_property
     def rim(self) -> Ints:
-        """The points (k,) of the boundary, counter-clockwise about the normal."""
+        """Indices (k,) of the points on the boundary, counter-clockwise about the normal."""
         loop = np.asarray(igl.boundary_loop(self.triangles.astype(np.int64)))
         corners = self.points[loop] - self.points[loop].mean(axis=0)
         upward = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0) @ self.normal > 0
         return loop if upward else loop[::-1]
 
     def turns(self, first: Floats) -> Floats:
-        """The position (k,) of each point of the rim around the unit square, in turns from the middle of the square's side x = 1;
-        ``first`` (3,) is the direction of its first side.
+        """Positions (k,) of the rim points on the boundary of the unit square, from 0 to 1 around it, 0 at x = 1, y = 1/2.
 
-        The position is a fraction of length after a stretch that makes width and height equal, so a rectangle is mapped linearly.
+        ``first`` (3,): the direction in the section that is mapped to the x axis of the square. Positions are fractions of the
+        rim's length after a stretch that makes the width and height of the section equal, so that a rectangle is mapped linearly.
         """
         centre, product = self.moments
         axes = np.stack([first, np.cross(self.normal, first)])
@@ -63,13 +65,15 @@ class CrossSection:
         return _around((self.points[self.rim] - centre) @ axes.T @ (vectors / np.sqrt(values)) @ vectors.T)
 
     def square(self, turns: Floats) -> Floats:
-        """The position (n, 2) of each point in the unit square, by a harmonic map; ``turns`` (k,) are the positions of the rim."""
+        """Positions (n, 2) of all points in the unit square, by a harmonic map. ``turns`` (k,): the result of :meth:`turns`."""
         rim = np.stack([np.interp(turns, _SHARES, side) for side in _SQUARE], axis=1)
         return np.asarray(igl.harmonic(self.points, self.triangles.astype(np.int64), self.rim, rim, 1))
 
 
 def _around(loop: Floats) -> Floats:
-    """Fractions (k,) of the length of a counter-clockwise ``loop`` (k, 2), from its farthest crossing of the first axis."""
+    """Positions (k,) of the points of a counter-clockwise ``loop`` (k, 2), as fractions of its length. They start where the loop
+    crosses the first axis farthest from the origin.
+    """
     ahead = np.roll(loop, -1, axis=0)
     lengths = np.linalg.norm(ahead - loop, axis=1)
     rises = np.flatnonzero((loop[:, 1] < 0) & (ahead[:, 1] >= 0))
@@ -81,8 +85,8 @@ def _around(loop: Floats) -> Floats:
 
 
 def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection | None:
-    """The largest piece of the section of a ``mesh`` on which the field of ``values`` (n,) at its points is ``level``; None if the
-    piece has holes or does not exist. Its normal points towards larger values.
+    """Return the largest connected piece of the section of ``mesh`` on which the field with ``values`` (n,) at the points equals
+    ``level``, with its normal towards larger values. Returns None if there is no section or if that piece has holes.
     """
     above = values - level
     above = np.where(np.abs(above) < _NUDGE, _NUDGE, above)
@@ -100,7 +104,7 @@ def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection |
 
 
 def _cut(mesh: TetMesh, above: Floats) -> tuple[Ints, Floats]:
-    """The three cut edges (k, 3, 2) for each triangle in which a section cuts a tet, and a direction (k, 3) of increase."""
+    """Return the three cut edges (k, 3, 2) for each triangle in which a section cuts a tet, and vectors (k, 3) to larger values."""
     order = np.take_along_axis(mesh.tets, np.argsort(above[mesh.tets], axis=1, kind="stable"), axis=1)
     below = (above[order] < 0).sum(axis=1)
     patterns = {
@@ -115,7 +119,7 @@ def _cut(mesh: TetMesh, above: Floats) -> tuple[Ints, Floats]:
 
 
 def _greatest(points: Floats, triangles: Ints) -> CrossSection | None:
-    """The piece with the largest area, or None if it has more than one boundary."""
+    """Return the connected piece with the largest area, or None if that piece has holes."""
     _, pieces = igl.facet_components(triangles.astype(np.int64))
     areas = np.bincount(pieces, weights=np.linalg.norm(normals(points[triangles]), axis=1))
     triangles = triangles[pieces == np.argmax(areas)]
@@ -129,11 +133,11 @@ def _greatest(points: Floats, triangles: Ints) -> CrossSection | None:
 
 
 def carried(known: CrossSection, turns: Floats, other: CrossSection) -> Floats:
-    """The positions (m,) of the rim of the ``other`` section along the unit square, from the positions ``turns`` (n,) of the
-    ``known`` rim.
+    """Positions (m,) of the rim points of the ``other`` section along the unit square, transferred from the positions ``turns``
+    (n,) of the rim points of the ``known`` section.
 
-    The points of the other rim are matched, in order, with points of the known rim. The matching minimises the mean square of their
-    distance across the muscle plus a cost of stretch.
+    Points on the other rim are matched, in order, with points on the known rim. The matching minimises the mean square distance
+    between matched points, measured across the muscle, plus a penalty on stretch.
     """
     normal = known.normal + other.normal
     normal /= max(float(np.linalg.norm(normal)), 1e-12)
@@ -150,23 +154,23 @@ def carried(known: CrossSection, turns: Floats, other: CrossSection) -> Floats:
 
 
 def _shares(rim: Floats) -> Floats:
-    """The fractions (k,) of the length of a closed ``rim`` (k, 3) from its first point to each."""
+    """Positions (k,) of the points of a closed ``rim`` (k, 3), as fractions of its length from the first point."""
     lengths = np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1)
     return np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / lengths.sum()
 
 
 def _at(places: Floats, shares: Floats, rim: Floats) -> Floats:
-    """Points (n, 3) on a closed ``rim`` (k, 3) at ``places`` (n,), in turns like the positions ``shares`` (k,) of its points."""
+    """Points (n, 3) on a closed ``rim`` (k, 3) at the positions ``places`` (n,); ``shares`` (k,): the positions of its points."""
     return np.stack([np.interp(places, shares, axis, period=1) for axis in rim.T], axis=1)
 
 
 def _continued(places: Floats, known: Floats, values: Floats) -> Floats:
-    """Values (n,) at ``places`` (n,) around a rim, interpolated from ``values`` (k,) at ``known`` places (k,), all in turns."""
+    """Interpolate ``values`` (k,), given at the positions ``known`` (k,) around a rim, at ``places`` (n,). All have period 1."""
     return places + np.interp(places, known, np.unwrap(values - known, period=1), period=1)
 
 
 def _nearest(rim: Floats, shares: Floats, point: Floats) -> float:
-    """The position, as a fraction of its length, at which a closed ``rim`` (k, 3) is nearest to a ``point`` (3,)."""
+    """Position on a closed ``rim`` (k, 3) nearest to ``point`` (3,), as a fraction of the rim's length like ``shares`` (k,)."""
     ahead = np.roll(rim, -1, axis=0) - rim
     squares = np.maximum((ahead**2).sum(axis=1), np.finfo(float).tiny)
     along = np.clip(((point - rim) * ahead).sum(axis=1) / squares, 0, 1)
@@ -175,7 +179,9 @@ def _nearest(rim: Floats, shares: Floats, point: Floats) -> float:
 
 
 def _matched(one: Floats, other: Floats) -> Floats:
-    """The fraction (n,) of the length by which each sample of the rim ``one`` (n, 3) is ahead of its match on the ``other`` rim."""
+    """Match each sample of the rim ``other`` (n, 3) with a point of the rim ``one`` (n, 3). Returns the lead (n,) of the match over
+    the sample of ``one`` with the same index, as a fraction of the rim's length.
+    """
     shift = int(np.argmin([((np.roll(one, -by, axis=0) - other) ** 2).sum() for by in range(len(one))]))
     reach = range(shift - _REACH, shift + _REACH + 1)
     apart = np.stack([((np.roll(one, -by, axis=0) - other) ** 2).sum(axis=1) for by in reach], axis=1)
@@ -189,7 +195,9 @@ def _matched(one: Floats, other: Floats) -> Floats:
 
 
 def _least(apart: Floats, stiffness: float) -> Ints:
-    """The shifts (n,), from -60 to 60, with the least sum of squares ``apart`` (n, 121) plus a cost of changes; the first is 0."""
+    """Find the shifts (n,), from -60 to 60, with the smallest sum of the squared distances ``apart`` (n, 121) and of the cost of
+    changes, ``stiffness`` times the square of each change. The first shift is 0.
+    """
     count, width = apart.shape
     costs, steps = np.full(width, np.inf), np.zeros((count + 1, width), np.int64)
     costs[_REACH] = apart[0, _REACH]

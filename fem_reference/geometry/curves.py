@@ -1,8 +1,8 @@
 """Curves through a few points: the estimation techniques of the report's sections 3.1 to 3.5, for fibres and outlines.
 
-A curve is a callable from parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two formulas of the report
-have misprints. The second row of the Bezier matrix (3.1) must be -3, 3, 0, 0. The matrix (3.2) belongs to the uniform spline, not
-to the centripetal spline: the exponent of the knots and the tension of (3.3) are different parameters.
+A curve is a callable that maps parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two formulas of the
+report have misprints. The second row of the Bezier matrix (3.1) must be -3, 3, 0, 0. The matrix (3.2) belongs to the uniform
+spline, not to the centripetal spline: the exponent of the knots and the tension of (3.3) are different parameters.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,9 @@ Curve = Callable[[Floats], Floats]
 
 
 def knots(points: Floats, exponent: float = 1.0) -> Floats:
-    """Parameters (n,) of ``points`` (n, d), 0 to 1, with steps of distance**``exponent``: 0 uniform, 0.5 centripetal, 1 chordal."""
+    """Parameters (n,) of ``points`` (n, d), from 0 to 1, with steps proportional to distance**``exponent``: 0 for uniform, 0.5 for
+    centripetal and 1 for chordal knots. Raises InputError if there are fewer than two points or if consecutive points coincide.
+    """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if len(points) < 2 or not (steps > 0).all():
         got = f"{len(points)} points, {int((steps == 0).sum())} repeated"
@@ -28,7 +30,7 @@ def knots(points: Floats, exponent: float = 1.0) -> Floats:
 
 
 def constant(points: Floats) -> Curve:
-    """The step function with the value of the nearest of ``points`` (n, d) by chord length (report 3.1)."""
+    """Step function with the value of the nearest of ``points`` (n, d) in chord length (report 3.1)."""
     found: Curve = scipy.interpolate.interp1d(knots(points), points, kind="nearest", axis=0)
     return found
 
@@ -40,18 +42,17 @@ def linear(points: Floats) -> Curve:
 
 
 def bezier(points: Floats) -> Curve:
-    """The Bezier curve of degree n - 1 with control points ``points`` (n, d); it passes through the first and the last (3.1)."""
+    """Bezier curve of degree n - 1 with the control points ``points`` (n, d); it passes through the first and the last (3.1)."""
     knots(points)
     found: Curve = scipy.interpolate.BPoly(points[:, None], [0.0, 1.0])
     return found
 
 
 def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
-    """The Catmull-Rom spline through ``points`` (n, d). ``exponent``: 0 uniform (3.2), 0.5 centripetal, 1 chordal.
+    """Catmull-Rom spline through ``points`` (n, d). ``exponent``: 0 for uniform (3.2), 0.5 for centripetal, 1 for chordal knots.
 
-    Its tangents are the tangents of the parabola through a point and its two neighbours (Barry and Goldman 1988,
-    doi 10.1145/378456.378511). At an end the end point itself replaces the missing neighbour (report 3.3), which gives half the
-    slope of the chord.
+    Its tangent at a point is that of the parabola through the point and its two neighbours (Barry and Goldman 1988,
+    doi 10.1145/378456.378511). At an end, the end point replaces the missing neighbour (report 3.3), which halves the slope.
     """
     times = knots(points, exponent)
     slopes = np.diff(points, axis=0) / np.diff(times)[:, None]
@@ -64,9 +65,9 @@ def catmull_rom(points: Floats, exponent: float = 0.5) -> Curve:
 
 
 def fourier(points: Floats) -> Curve:
-    """The discrete Fourier series of ``points`` (n, d), assumed to be equidistant (3.4, 3.5).
+    """Discrete Fourier series of ``points`` (n, d), which are assumed to be equidistant (3.4, 3.5).
 
-    The chord, the straight line between the two ends, is subtracted first, and the remainder is extended as an odd periodic
+    The chord, the straight line between the two ends, is subtracted first, and the remainder is extended to an odd periodic
     function, so that the curve passes through the ends.
     """
     count = len(knots(points)) - 1
@@ -77,7 +78,7 @@ def fourier(points: Floats) -> Curve:
 
 
 def radial(points: Floats, shape: float = 3.0) -> Curve:
-    """Gaussian radial basis functions plus a linear polynomial that interpolate ``points`` (n, d) by chord length (3.6, 3.10).
+    """Interpolate ``points`` (n, d) over chord length by Gaussian radial basis functions plus a linear polynomial (3.6, 3.10).
 
     ``shape``: the length of the curve divided by the width of a Gaussian.
     """
@@ -86,7 +87,7 @@ def radial(points: Floats, shape: float = 3.0) -> Curve:
     return lambda t: np.asarray(found(np.asarray(t, dtype=float)[:, None]))
 
 
-# The techniques by the names that pages and scenes use, with the class of smoothness of their curves: C^-1, C^0, ...
+# The techniques, by the names used in pages and scenes, with the smoothness class of their curves: -1 for C^-1, 0 for C^0, ...
 TECHNIQUES: dict[str, tuple[Callable[[Floats], Curve], float]] = {
     "constant": (constant, -1),
     "piecewise linear": (linear, 0),

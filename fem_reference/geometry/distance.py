@@ -1,4 +1,4 @@
-"""Exact unsigned distance from points to a triangle surface, winding numbers of closed surfaces, and points that are far apart."""
+"""Exact unsigned distance from points to a triangle surface, winding numbers of closed surfaces, and sets of distant points."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -11,14 +11,14 @@ from scipy.spatial import cKDTree
 from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal, normals
 from fem_reference.geometry.near_pairs import reached
 
-# The distance of a sample point just outside a triangle, as a fraction of the surface's diagonal.
+# The distance from a triangle to the sample point just outside it, as a fraction of the surface's diagonal.
 _STEP = 1e-5
-# The number of triangles within another part whose depth is measured: the triangles farthest from the uncovered triangles.
+# The number of triangles within another part whose depth is measured: those farthest from the uncovered triangles.
 _WITHIN = 16
 
 
 class Distances(NamedTuple):
-    """Distances of n points to a ``surface``: ``distance`` (n,) [mm], closest ``triangle`` (n,), ``closest`` point (n, 3) [mm]."""
+    """Distances of n points to a ``surface``: ``distance`` (n,) [mm], closest ``triangle`` (n,), and ``closest`` point (n, 3)."""
 
     distance: Floats
     triangle: Ints
@@ -27,30 +27,30 @@ class Distances(NamedTuple):
 
     @property
     def barycentric(self) -> Floats:
-        """The coordinates (n, 3) of the closest points in their triangles."""
+        """Barycentric coordinates (n, 3) of the closest points in their triangles."""
         return _barycentric(self.closest, self.surface.points[self.surface.triangles[self.triangle]])
 
 
 def distances(points: Floats, surface: Surface) -> Distances:
-    """The closest point of ``surface`` for each of ``points`` (n, 3) [mm]; ValueError if a point is not finite."""
+    """Find the closest point on ``surface`` for each of ``points`` (n, 3) [mm]; ValueError if a point is not finite."""
     points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
     for what, given in (("points", points), ("points of the surface", surface.points)):
-        if not np.isfinite(given).all():  # libigl would return triangles that do not exist
+        if not np.isfinite(given).all():  # libigl would return indices of triangles that do not exist
             raise ValueError(f"distances: the {what} are not all finite")
     if len(points) == 0:
         return Distances(np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3)), surface)
     vertices, triangles = surface.points, surface.triangles
     tree = _tree(vertices.tobytes(), triangles.tobytes())
     squares, triangle, closest = tree.squared_distance(vertices, triangles, points)
-    lost = ~np.isfinite(squares)  # libigl's results are arbitrary where squares overflow
+    lost = ~np.isfinite(squares)  # the results of libigl are arbitrary if the squared distance overflows
     triangle[lost], closest[lost] = 0, vertices[triangles[0, 0]]
     return Distances(np.sqrt(np.maximum(squares, 0)), np.asarray(triangle, np.int64), closest, surface)
 
 
-# A surface is often queried for a few points at a time, and building its search tree takes as long as thousands of queries.
+# Surfaces are often queried for a few points at a time, and building a search tree takes as long as thousands of queries.
 @lru_cache(maxsize=8)
 def _tree(points: bytes, triangles: bytes) -> igl.AABB:
-    """A search tree of boxes for the surface with the arrays ``points``, 64-bit floats, and ``triangles``, 64-bit integers."""
+    """Search tree of a surface, given as the bytes of its ``points`` (64-bit floats) and ``triangles`` (64-bit integers)."""
     tree = igl.AABB()
     tree.init(*_arrays(points, triangles))
     return tree
@@ -68,7 +68,7 @@ def _arrays(points: bytes, triangles: bytes) -> tuple[Floats, Ints]:
 
 
 def _barycentric(points: Floats, corners: Floats) -> Floats:
-    """Weights (n, 3), at least 0 and of sum 1, of ``corners`` (n, 3, 3) at ``points`` (n, 3) in their triangles."""
+    """Barycentric coordinates (n, 3), not negative and with sum 1, of ``points`` (n, 3) in triangles with ``corners`` (n, 3, 3)."""
     opposite = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
     normal = np.cross(opposite[:, 0], opposite[:, 1])
     to_point = points[:, None] - corners[:, [1, 2, 0]]
@@ -86,8 +86,8 @@ def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
 
 
 def flattened(surface: Surface, place: Floats) -> float:
-    """The error of a flat triangle on a curved surface, times the radius of curvature [mm2]. The error is the distance of the
-    triangle's middle from a sphere of this radius through its corners; the triangle is the nearest to a ``place`` (3,) [mm].
+    """Error of a flat triangle on a curved surface, multiplied by the radius of curvature [mm2]. The error is the distance from the
+    centre of the triangle to a sphere with this radius through its corners. The triangle is the one nearest to ``place`` (3,) [mm].
     """
     corners = surface.points[surface.triangles]
     reach = (1 + 1e-9) * float(np.linalg.norm(corners - place, axis=2).min())
@@ -98,11 +98,11 @@ def flattened(surface: Surface, place: Floats) -> float:
 
 @np.errstate(over="ignore", invalid="ignore")
 def outer_windings(surface: Surface) -> Floats:
-    """The winding number (m,) of the surface at a point just outside each triangle. It is 0 on the skin of a valid body,
-    positive inside another part of the body, negative if the triangle faces a part that is inside out, NaN without a normal.
+    """Winding number (m,) of the surface at a point just outside each triangle. It is 0 on the skin of a valid body, positive
+    inside another part of the body, negative if the triangle faces a part that is inside out, and NaN if the normal is undefined.
 
-    "Just outside" is 1e-5 of the surface's diagonal away; thinner folds are not distinguished. The winding numbers of Barill et
-    al. 2018, doi 10.1145/3197517.3201337, differ by a few thousandths from the whole numbers to which they are rounded.
+    "Just outside" means 1e-5 of the surface's diagonal away; thinner folds are not resolved. The winding numbers of Barill et al.
+    2018, doi 10.1145/3197517.3201337, differ by a few thousandths from the integers to which they are rounded here.
     """
     points, triangles = surface.points - surface.points.mean(axis=0), surface.triangles
     corners = points[triangles]
@@ -116,8 +116,9 @@ def outer_windings(surface: Surface) -> Floats:
 
 
 def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
-    """A lower bound on the maximum depth [mm] of the centroids of the triangles ``some`` (m,) within another part of the closed
-    ``surface``. The depth is the distance of a centroid to the nearest opposing triangle in front; 0 without self-intersection.
+    """Lower bound on the maximum depth [mm] of the triangles ``some``, a mask (m,), within another part of the closed ``surface``.
+    The depth of a triangle is the distance of its centroid from the nearest triangle that faces the other way and has the centroid
+    behind it. The result is 0 without self-intersection.
     """
     corners = surface.points[surface.triangles]
     middles, across, covered = corners.mean(axis=1), normals(corners), outer_windings(surface) > 0.5
@@ -135,7 +136,7 @@ def depth_within(surface: Surface, some: NDArray[np.bool_]) -> float:
 
 
 def farthest_points(points: Floats, count: int) -> Ints:
-    """Indices (count,) of ``points`` (n, d): first the farthest from their mean, then each farthest from all chosen before."""
+    """Indices (count,) of ``points`` (n, d): first the farthest from the mean, then each time the farthest from those chosen."""
     chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     away = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):

@@ -1,4 +1,4 @@
-"""The edges of a closed surface: their lengths and dihedral angles."""
+"""Edges of a closed surface: their lengths and dihedral angles."""
 
 from dataclasses import dataclass
 
@@ -9,8 +9,9 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """The edges of a closed surface: ``ends`` (e, 2), in the direction of the left triangle seen from outside; ``beside`` (e, 2),
-    the left and the right triangle; ``opposite`` (e, 2), their third corners; ``areas`` (e,) [mm2], a third of both areas.
+    """Edges of a closed surface. ``ends`` (e, 2): the vertices, in the direction of the left triangle seen from outside; ``beside``
+    (e, 2): the left and the right triangle; ``opposite`` (e, 2): the third vertices of these triangles; ``areas`` (e,) [mm2]: a
+    third of the total area of both triangles.
     """
 
     ends: Ints
@@ -20,7 +21,7 @@ class Edges:
 
     @classmethod
     def of(cls, surface: Surface) -> "Edges":
-        """The edges of a closed, consistently oriented surface at rest; their areas sum to the area of the surface."""
+        """Collect the edges of a closed, consistently oriented surface at rest; their areas add up to the area of the surface."""
         triangles = surface.triangles
         ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
         sides = twins(triangles)
@@ -29,16 +30,16 @@ class Edges:
         return cls(ends[sides[:, 0]], sides // 3, third[sides], areas[sides // 3].sum(axis=1))
 
     def lengths(self, points: Floats) -> Floats:
-        """Length of each edge (e,) [mm] with the surface's vertices at ``points`` (n, 3) [mm]."""
+        """Length (e,) [mm] of each edge when the vertices of the surface are at ``points`` (n, 3) [mm]."""
         return np.asarray(np.linalg.norm(points[self.ends[:, 1]] - points[self.ends[:, 0]], axis=1))
 
     @np.errstate(over="ignore", invalid="ignore")
     def angles(self, points: Floats) -> Floats:
-        """Angle (e,) [rad] from the normal of the left triangle to the normal of the right, in (-pi, pi].
+        """Dihedral angle (e,) [rad], in (-pi, pi], from the normal of the left triangle to the normal of the right triangle.
 
-        It is 0 if the two are coplanar, pi / 2 at the edges of a box and negative at a concave edge; NaN if a triangle has no
-        normal. It equals atan2((n x m) . d, n . m) with the unit normals n, m and the direction d of the edge: report eq. 5.23
-        without its arccos, which loses the sign and, for small angles, digits.
+        The angle is 0 if the triangles are coplanar, pi / 2 at the edges of a box, negative at a concave edge, and NaN if a
+        triangle has no normal. It equals atan2((n x m) . d, n . m) with the unit normals n, m and the direction d of the edge:
+        report eq. 5.23 without its arccos, which loses the sign and, for small angles, digits.
         """
         start, end = (points[corner] for corner in self.ends.T)
         along = end - start
@@ -49,6 +50,6 @@ class Edges:
 
 
 def _unit(vectors: Floats) -> Floats:
-    """Vectors (e, 3) of length 1; NaN for a vector whose length is zero or not finite."""
+    """Scale vectors (e, 3) to length 1; NaN for a vector whose length is zero or not finite."""
     lengths = np.linalg.norm(vectors, axis=1)
     return np.asarray(vectors / np.where(np.isfinite(lengths), lengths, np.nan)[:, None])

@@ -1,4 +1,4 @@
-"""Point location in tetrahedra: the tetrahedron of each point and its barycentric coordinates, which interpolate a solution."""
+"""Location of points in tetrahedra: the tetrahedron of each point and its barycentric coordinates, for interpolating a solution."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,18 +9,18 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, diagonal, edge_vectors
 from fem_reference.geometry.distance import Distances, distances
 
-# A point that rounding leaves between two tets is searched again at this distance, as a fraction of the mesh's diagonal.
+# A point that is found in no tet because of rounding is searched again at this distance, as a fraction of the mesh's diagonal.
 _NUDGE = 1e-9
-# A closest point with a barycentric coordinate below this counts as on the opposite edge, or at a corner.
+# A closest point with a barycentric coordinate below this value is considered to be on the opposite edge, or at a corner.
 _TIE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Embedding:
-    """The tet of each of n points, its barycentric coordinates there, and its distance outside the mesh.
+    """Positions of n points in a tetrahedral mesh. ``tets`` (n,): the tet of each point; ``barycentric`` (n, 4): the coordinates in
+    that tet; ``outside`` (n,) [mm]: the distance of the point from the mesh, 0 if it is inside.
 
-    ``tets`` (n,), ``barycentric`` (n, 4), ``outside`` (n,) [mm], 0 inside. For a point outside, the tet is behind the closest
-    boundary triangle, and the coordinates extrapolate (some are negative).
+    A point outside the mesh belongs to the tet behind the closest boundary triangle; some of its coordinates are then negative.
     """
 
     tets: Ints
@@ -28,12 +28,12 @@ class Embedding:
     outside: Floats
 
     def interpolate(self, mesh: TetMesh, values: Floats) -> Floats:
-        """``values`` (k,) or (k, d) at the points of ``mesh``, linearly interpolated: (n,) or (n, d)."""
+        """Interpolate ``values`` (k,) or (k, d) at the points of ``mesh`` linearly; returns (n,) or (n, d)."""
         return np.asarray(np.einsum("ij,ij...->i...", self.barycentric, values[mesh.tets[self.tets]]))
 
 
 class Locator:
-    """Search trees over a mesh, for repeated embedding."""
+    """Search trees of a mesh, for repeated embedding."""
 
     def __init__(self, mesh: TetMesh) -> None:
         self.mesh = mesh
@@ -44,7 +44,7 @@ class Locator:
         self._tree.init(mesh.points, mesh.tets)
 
     def embed(self, points: Floats) -> Embedding:
-        """The embedding of ``points`` (n, 3) [mm]."""
+        """Embed ``points`` (n, 3) [mm]."""
         points = np.ascontiguousarray(points, np.float64)
         tets = self._containing(points)
         lost = np.flatnonzero(tets < 0)
@@ -59,7 +59,7 @@ class Locator:
         return Embedding(tets, barycentric(points, self.mesh.points[self.mesh.tets[tets]]), outside)
 
     def _first_of_ties(self, skin: Distances) -> Ints:
-        """The closest boundary triangles (n,); at an edge or corner the first of them, so that rounding does not decide."""
+        """Closest boundary triangles (n,). At an edge or corner, the first of the equally close ones, independent of rounding."""
         chosen, inner = np.array(skin.triangle), skin.barycentric
         for i in np.flatnonzero((inner < _TIE).any(axis=1)):
             chosen[i] = self._firsts[frozenset(self.faces[chosen[i]][inner[i] >= _TIE].tolist())]
@@ -81,11 +81,11 @@ class Locator:
 
 
 def embed(mesh: TetMesh, points: Floats) -> Embedding:
-    """The embedding of ``points`` (n, 3) [mm] in ``mesh``."""
+    """Embed ``points`` (n, 3) [mm] in ``mesh``."""
     return Locator(mesh).embed(points)
 
 
 def barycentric(points: Floats, corners: Floats) -> Floats:
-    """Barycentric coordinates (n, 4) of points (n, 3) in tets of ``corners`` (n, 4, 3)."""
+    """Barycentric coordinates (n, 4) of ``points`` (n, 3) in tets with ``corners`` (n, 4, 3)."""
     last = np.linalg.solve(edge_vectors(corners), (points - corners[:, 0])[:, :, None])[:, :, 0]
     return np.concatenate([1 - last.sum(axis=1, keepdims=True), last], axis=1)

@@ -1,6 +1,6 @@
-"""A fixed linear extension of a surface's displacement to points inside, the same for every run of a case.
+"""Linear extension of a surface's displacement to points inside, with weights that are the same for every run of a case.
 
-Mean value coordinates for closed triangle meshes: Ju, Schaefer, Warren 2005, doi 10.1145/1073204.1073229.
+The weights are mean value coordinates for closed triangle meshes: Ju, Schaefer, Warren 2005, doi 10.1145/1073204.1073229.
 """
 
 from dataclasses import dataclass
@@ -11,17 +11,19 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal
 from fem_reference.foundations.rows import distinct
 from fem_reference.geometry.distance import distances
 
-# A point closer to the surface than this fraction of its diagonal counts as on it.
+# A point that is closer to the surface than this fraction of the surface's diagonal counts as on it.
 _ON = 1e-10
-# If the sine of the angle between a triangle's plane and the line of sight is below this, its solid angle counts as 0.
+# If the sine of the angle between the plane of a triangle and the line of sight is below this, the triangle is seen edge-on, and
+# its solid angle counts as 0.
 _EDGE_ON = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class Extension:
-    """``points`` (m, 3) [mm] that follow a surface at ``rest`` (n, 3) [mm] by ``weights`` (m, n), whose rows sum to 1.
+    """Extension of displacement from a surface to ``points`` (m, 3) [mm]. ``rest`` (n, 3) [mm]: the points of the surface at rest;
+    ``weights`` (m, n): the weights of the surface's displacements, with the sum 1 in each row.
 
-    The extension is exact for affine motion of the surface; on the surface it is linear interpolation in the triangle.
+    The extension is exact for affine motion of the surface. On the surface it equals linear interpolation in the triangle.
     """
 
     points: Floats
@@ -30,7 +32,7 @@ class Extension:
 
     @classmethod
     def to(cls, points: Floats, rest: Surface) -> "Extension":
-        """The extension from the closed surface ``rest`` to ``points`` (m, 3) inside it or near it."""
+        """Compute the extension from the closed surface ``rest`` to ``points`` (m, 3), which are inside the surface or near it."""
         points = np.ascontiguousarray(points, np.float64)
         weights = np.zeros((len(points), len(rest.points)))
         nearest = distances(points, rest)
@@ -43,13 +45,13 @@ class Extension:
         return cls(points, rest.points, weights)
 
     def apply(self, positions: Floats) -> Floats:
-        """The positions of the points (m, 3) [mm] for surface points at ``positions`` (n, 3) [mm]."""
+        """Positions (m, 3) [mm] of the points when the points of the surface are at ``positions`` (n, 3) [mm]."""
         return np.asarray(self.points + self.weights @ (positions - self.rest))
 
 
 class _Edges:
-    """The e edges of m ``triangles`` (m, 3), with their ``ends`` (2, e). For each corner of a triangle, ``opposite`` (3, m) is the
-    opposite edge, and ``sense`` (3, m), 1 or -1, the direction in which the triangle runs along this edge.
+    """Edges of m ``triangles`` (m, 3). ``ends`` (2, e): the vertices of the e edges; ``opposite`` (3, m): the index of the edge
+    opposite each corner of a triangle; ``sense`` (3, m): 1 or -1, the direction in which the triangle runs along that edge.
     """
 
     def __init__(self, triangles: Ints) -> None:
@@ -61,16 +63,16 @@ class _Edges:
 
 
 def _mean_value_weights(point: Floats, rest: Floats, edges: _Edges) -> Floats:
-    """The weights (n,) of the ``rest`` (n, 3) corners for a point off the surface.
+    """Weights (n,) of the surface points ``rest`` (n, 3) for a ``point`` (3,) off the surface.
 
-    The unit vectors u_i to the corners of a triangle span a spherical triangle. Let c_i be the vector product of the other two unit
-    vectors, s_i its length and theta_i the angle between them. The mean vector is then m = 1/2 sum theta_i c_i / s_i. Corner i at
-    the distance d_i has the weight c_i . m / (d_i c_i . u_i), where c_i . u_i is the same for all three corners.
+    The unit vectors u_i from the point to the corners of a triangle span a spherical triangle. Let c_i be the cross product of the
+    other two unit vectors, s_i its length and theta_i the angle between them. The mean vector is m = 1/2 sum theta_i c_i / s_i.
+    Corner i, at the distance d_i, has the weight c_i . m / (d_i c_i . u_i), where c_i . u_i is the same for all three corners.
     """
     rays = rest - point
     lengths = np.sqrt(np.einsum("nk,nk->n", rays, rays))
     units = np.ascontiguousarray((rays / lengths[:, None]).T)
-    first, second = units.take(edges.ends, axis=1).transpose(1, 0, 2)  # several times as fast as indexing with brackets
+    first, second = units.take(edges.ends, axis=1).transpose(1, 0, 2)  # ``take`` is several times as fast as indexing
     products = np.cross(first, second, axis=0)
     sines = np.sqrt(np.einsum("ke,ke->e", products, products))
     angles = np.arctan2(sines, np.einsum("ke,ke->e", first, second))

@@ -1,8 +1,8 @@
 """Fibres of a template in the unit cube, mapped to sections of a muscle: the decomposition of Kohout and Kukacka (report 6.1.2).
 
-Their method uses isocontours on the surface. Here each contour is the rim of a section of the Laplace field in tetrahedra, and a
-harmonic map of that section gives the points inside. These points are in the muscle; between sections, lines may leave the muscle
-where it bends. Only the largest section of a muscle with several heads is followed; where a head begins or ends, lines are twisted.
+Their method uses isocontours on the surface. Here each contour is the rim of a section of a Laplace field in tetrahedra, and points
+inside come from a harmonic map of that section. These points are in the muscle; between sections, lines may leave it where it
+bends. If a muscle has several heads, only the largest section is followed; where a head begins or ends, lines are twisted.
 """
 
 from dataclasses import dataclass
@@ -18,15 +18,16 @@ from fem_reference.geometry.fibres import POINTS, FibreField, resample
 from fem_reference.geometry.radial_basis import halton
 
 PLACE = "fibres.kohout_kukacka"
-_WINDOW = 7  # the number of points of a line through which smoothing fits a parabola
-_FLAT = 1e-9  # twice the area of a triangle in the unit square below which its corners count as collinear
-_SHORTEST = 0.1  # the minimum length of a pennate fibre, as a fraction of the longest fibre's extent along the muscle
+_WINDOW = 7  # the number of consecutive points of a line to which smoothing fits a parabola
+_FLAT = 1e-9  # twice the area in the unit square below which the corners of a triangle count as collinear
+_SHORTEST = 0.1  # the minimum length of a pennate fibre along the muscle, as a fraction of that of the longest fibre
 
 
 @dataclass(frozen=True, eq=False)
 class Contours:
-    """Sections of a muscle from one attachment to the other. ``squares``: the positions of their points in the unit square;
-    ``heights`` (k,): their positions, between 0 and 1, along the line of a ``length`` [mm] through their centres.
+    """Sections of a muscle from one attachment to the other. ``squares``: the positions of the points of each section in the unit
+    square; ``heights`` (k,): the positions of the sections, from 0 to 1, along the line through their centres; ``length`` [mm]: the
+    length of this line.
     """
 
     sections: tuple[CrossSection, ...]
@@ -36,12 +37,12 @@ class Contours:
 
     @property
     def width(self) -> float:
-        """The mean width [mm] of the sections along the first side of their squares."""
+        """Mean width [mm] of the sections in the direction of the x axis of their squares."""
         sides = np.array([[0.0, 0.5], [1.0, 0.5]])
         return float(np.mean([np.linalg.norm(np.diff(self._on(i, sides), axis=0)) for i in range(len(self.sections))]))
 
     def place(self, cube: Floats) -> Floats:
-        """Points (n, 3) [mm] for positions (n, 3) in the unit ``cube``, linear between sections and beyond both ends."""
+        """Map positions (n, 3) in the unit ``cube`` to points (n, 3) [mm], linearly between sections and beyond both ends."""
         last = len(self.heights) - 2
         below = np.clip(np.searchsorted(self.heights, cube[:, 2], side="right") - 1, 0, last)
         found = np.empty_like(cube)
@@ -53,7 +54,7 @@ class Contours:
         return found
 
     def _on(self, i: int, places: Floats) -> Floats:
-        """Points (n, 3) on section ``i`` for the positions ``places`` (n, 2) in its square."""
+        """Points (n, 3) on section ``i`` at the positions ``places`` (n, 2) in its square."""
         square, triangles = np.pad(self.squares[i], ((0, 0), (0, 1))), self.sections[i].triangles
         triangles = triangles[np.linalg.norm(normals(square[triangles]), axis=1) > _FLAT]
         found = distances(np.pad(places, ((0, 0), (0, 1))), Surface(square, triangles))
@@ -62,10 +63,10 @@ class Contours:
 
 
 def contours(field: FibreField, count: int, towards: Floats | None = None) -> Contours:
-    """``count`` sections between the attachments, with about equal volumes between them; a section with holes is left out.
+    """Return ``count`` sections between the attachments, with about equal volumes between them; sections with holes are left out.
 
-    The first side of the middle section's square is along ``towards`` (3,) or, if this is None, along the longest axis. The squares
-    are carried from section to section by matching nearest points of neighbouring rims.
+    The x axis of the middle section's square is along ``towards`` (3,) or, if that is None, along the longest axis of the section.
+    The squares are passed on from section to section by matching nearest points of neighbouring rims.
     """
     means = field.values[field.mesh.tets].mean(axis=1)
     levels = np.quantile(means, (np.arange(count) + 0.5) / count)
@@ -86,7 +87,7 @@ def contours(field: FibreField, count: int, towards: Floats | None = None) -> Co
 
 
 def _first(middle: CrossSection, product: Floats, towards: Floats | None) -> Floats:
-    """The unit vector (3,) in the ``middle`` section along ``towards``, or along the longest axis (largest component positive)."""
+    """Unit vector (3,) in the ``middle`` section along ``towards``, or along its longest axis (largest component positive)."""
     if towards is None:
         longest = np.linalg.eigh(product)[1][:, 2]
         towards = longest * np.sign(longest[np.argmax(np.abs(longest))])
@@ -97,8 +98,8 @@ def _first(middle: CrossSection, product: Floats, towards: Floats | None) -> Flo
 
 
 def template(count: int, slope: float) -> Floats:
-    """Control points (count, 2, 3) of Bezier curves in the unit cube, spread evenly (Halton). The curves are parallel to the third
-    axis, or inclined towards the first axis by the ``slope`` and cut off at the cube's sides.
+    """Control points (count, 2, 3) of straight Bezier curves that are evenly distributed in the unit cube (Halton). The curves are
+    parallel to the z axis, or inclined towards the x axis by the ``slope`` and cut off at the sides of the cube.
     """
     across = halton(count, 2)
     margin = _SHORTEST * min(slope, 1.0)
@@ -109,8 +110,8 @@ def template(count: int, slope: float) -> Floats:
 
 
 def mapped(field: FibreField, found: Contours, count: int, pennation: float = 0.0) -> Polylines:
-    """``count`` lines of 40 points along the muscle, inclined towards the squares' first side by ``pennation`` [rad], and
-    smoothed by parabolas. Lines that reach an end of the cube end on the attachment there.
+    """Map ``count`` template lines to the muscle, as lines of 40 points smoothed by parabolas. The lines are inclined by
+    ``pennation`` [rad] towards the x axis of the squares. A line that reaches an end of the cube ends on the attachment there.
     """
     curves = template(count, np.tan(pennation) * found.length / found.width)
     samples = [_samples(ends, found.heights) for ends in curves]
@@ -127,15 +128,15 @@ def mapped(field: FibreField, found: Contours, count: int, pennation: float = 0.
 
 
 def _samples(ends: Floats, heights: Floats) -> Floats:
-    """Points (k, 3) of the Bezier curve of control points ``ends`` (2, 3): its ends, and one at each height between them."""
+    """Points (k, 3) of the Bezier curve with control points ``ends`` (2, 3): both ends, and a point at each height between them."""
     low, high = ends[:, 2]
     between = heights[(heights > low + 1e-6) & (heights < high - 1e-6)]
     return bezier(ends)((np.concatenate([[low], between, [high]]) - low) / (high - low))
 
 
 def _smooth(line: Floats) -> Floats:
-    """The line (40, 3) with each point on the parabola that best fits it and its six neighbours; the ends stay."""
-    from scipy.signal import savgol_filter  # imported here, as it loads scipy.stats, which takes half a second
+    """Move each point of the line (40, 3) onto the parabola that best fits it and its six neighbours; the ends stay fixed."""
+    from scipy.signal import savgol_filter  # imported here because scipy.stats, which it loads, takes half a second
 
     found = savgol_filter(line, _WINDOW, 2, axis=0, mode="interp")
     found[[0, -1]] = line[[0, -1]]

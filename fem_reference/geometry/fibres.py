@@ -1,4 +1,4 @@
-"""Fibre directions and traced fibres: the lines of steepest ascent of a Laplace field from one attachment to the other."""
+"""Fibre directions and traced fibres, which are lines of steepest ascent of a Laplace field from one attachment to the other."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,19 +16,20 @@ from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.nested import EDGES
 
 POINTS = 40  # the number of points on each line
-_NEAR = 1e-3  # a line has arrived where the field is this close to 0 or 1
-# Seeds whose scores differ by less than this fraction are ordered by their index, so that a rotated mesh gives the same lines.
+_NEAR = 1e-3  # a line has arrived at an attachment where the field is this close to 0 or 1
+# Seeds whose scores differ by less than this fraction are taken in the order of their indices, so that rotating a mesh does not
+# change the lines.
 _TIES = 1e-6
-_HALFWAY = 0.5 - _TIES  # a field value of 1/2 up to rounding counts as above it
+_HALFWAY = 0.5 - _TIES  # a field value that differs from 1/2 only by rounding counts as above it
 
-# From cells (n,) and rest points (n, 3) in them to unit vectors (n, 3); picklable.
+# A function that maps cells (n,) and rest points (n, 3) in them to unit vectors (n, 3); it can be pickled.
 Directions = Callable[[Ints, Floats], Floats]
 
 
 @dataclass(frozen=True, eq=False)
 class FibreField:
-    """A Laplace field between two attachments: ``values`` (n,) and ``gradients`` (n, 3) at the points of its own ``mesh``; the
-    value is 0 on the triangles ``start`` (m, 3) and 1 on ``end``.
+    """A Laplace field between two attachments. ``values`` (n,), ``gradients`` (n, 3): the field at the points of its own ``mesh``;
+    ``start``, ``end`` (m, 3): the triangles of the attachments, on which the field is 0 and 1.
     """
 
     mesh: TetMesh
@@ -38,13 +39,13 @@ class FibreField:
     end: Ints
 
     def __getstate__(self) -> dict[str, object]:
-        """The state without cached properties, for other processes."""
+        """Return the state without cached properties, for transfer to other processes."""
         return {name: value for name, value in vars(self).items() if name not in ("locator", "size")}
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
-        """Unit vectors (n, 3) along the fibres at rest ``points`` (n, 3), independent of their ``cells``."""
+        """Unit vectors (n, 3) along the fibres at rest ``points`` (n, 3); the ``cells`` have no influence."""
         found = self.directions(points)
-        flat = np.linalg.norm(found, axis=1) < 0.5  # zero gradient: all points around belong to one attachment
+        flat = np.linalg.norm(found, axis=1) < 0.5  # zero gradient: all mesh points around belong to one attachment
         if flat.any():
             mean = self.gradients.mean(axis=0)
             found[flat] = mean / np.linalg.norm(mean)
@@ -57,7 +58,7 @@ class FibreField:
 
     @cached_property
     def size(self) -> float:
-        """The mean length of the edges of the mesh [mm]."""
+        """Mean length [mm] of the edges of the mesh."""
         first, second = np.moveaxis(self.mesh.points[self.mesh.tets[:, EDGES]], 2, 0)
         return float(np.linalg.norm(first - second, axis=2).mean())
 
@@ -76,8 +77,8 @@ class FibreField:
 
 
 def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
-    """The Laplace field in the tetrahedra of a muscle, by linear elements. It is 0 on the facets ``start`` of the ``mesh`` and 1 on
-    ``end``. It is 1/2 where the two touch, as they may on a coarse mesh. The flux through the rest of the boundary is 0.
+    """Solve the Laplace equation with linear elements in a muscle whose free boundary is insulated. The field is 0 on the facets
+    ``start`` of ``mesh``, 1 on the facets ``end``, and 1/2 where these touch, as they may on a coarse mesh.
     """
     zeros, ones = np.unique(mesh.facets[start]), np.unique(mesh.facets[end])
     values = np.zeros(len(mesh.points))
@@ -89,9 +90,9 @@ def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
 
 
 def trace(field: FibreField, count: int) -> Polylines:
-    """``count`` lines of 40 points each along ``field``, from one attachment to the other.
+    """Trace ``count`` lines of 40 points each along ``field`` from one attachment to the other.
 
-    The lines are spread over the section where the field is 1/2; InputError if fewer can be traced.
+    The lines are spread over the section on which the field is 1/2. Raises InputError if fewer lines can be traced.
     """
     seeds = _seeds(field)
     if len(seeds) == 0:
@@ -109,7 +110,7 @@ def trace(field: FibreField, count: int) -> Polylines:
 
 @dataclass(frozen=True, eq=False)
 class NearestLine:
-    """Fibre directions: at each point the direction of the segment of ``lines`` whose middle is nearest."""
+    """Fibre directions: at each point, the direction of the segment of ``lines`` whose midpoint is nearest."""
 
     lines: Polylines
 
@@ -124,7 +125,7 @@ class NearestLine:
 
     @cached_property
     def segments(self) -> tuple[Floats, Floats]:
-        """The middle of each segment (k, 3) and its direction (k, 3)."""
+        """Return the midpoint (k, 3) and the direction (k, 3) of each segment."""
         lines = self.lines
         starts = np.setdiff1d(np.arange(len(lines.points) - 1), lines.offsets[1:] - 1)
         along = lines.points[starts + 1] - lines.points[starts]
@@ -135,7 +136,7 @@ class NearestLine:
 
 @dataclass(frozen=True, eq=False)
 class Turned:
-    """The ``directions`` of fibres, all rotated by one matrix (3, 3)."""
+    """Fibre ``directions`` that are all rotated by one ``matrix`` (3, 3)."""
 
     directions: Directions
     matrix: Floats
@@ -146,14 +147,14 @@ class Turned:
 
 
 def _slopes(mesh: TetMesh, values: Floats) -> Floats:
-    """The gradient (k, 3) in each tet of ``values`` (n,) at the points."""
+    """Gradient (k, 3) in each tet of the field with ``values`` (n,) at the points."""
     corners = mesh.points[mesh.tets]
     rises = values[mesh.tets[:, 1:]] - values[mesh.tets[:, :1]]
     return np.asarray(np.linalg.solve(corners[:, 1:] - corners[:, :1], rises[:, :, None])[:, :, 0])
 
 
 def averaged(mesh: TetMesh, slopes: Floats) -> Floats:
-    """Vectors (n, 3) at the points of a ``mesh``: vectors ``slopes`` (k, 3) of the tets around each point, averaged by volume."""
+    """Average the vectors ``slopes`` (k, 3) of the tets around each point of a ``mesh``, weighted by volume; returns (n, 3)."""
     volumes = np.repeat(tet_volumes(mesh.points, mesh.tets), 4)
     share = np.bincount(mesh.tets.ravel(), weights=volumes, minlength=len(mesh.points))
     weighted = (volumes * np.repeat(slope, 4) for slope in slopes.T)
@@ -162,7 +163,7 @@ def averaged(mesh: TetMesh, slopes: Floats) -> Floats:
 
 
 def _seeds(field: FibreField) -> Floats:
-    """Points (k, 3) where the field is 1/2, away from the skin: in each tet the middle of the cut, and halfway to its corners."""
+    """Points (k, 3) off the skin at which the field is 1/2: the centre of each cut of a tet, and points halfway to its corners."""
     mesh = field.mesh
     ends = mesh.tets[:, EDGES]
     low, high = (field.values[ends[:, :, side]] - _HALFWAY for side in range(2))
@@ -179,7 +180,7 @@ def _seeds(field: FibreField) -> Floats:
 
 
 def spread(points: Floats, count: int) -> Floats:
-    """At most ``count`` of ``points`` (k, d), first the most central, then each farthest from all chosen before."""
+    """Choose at most ``count`` of ``points`` (k, d): first the most central, then each time the farthest from those chosen."""
     chosen = [_first_best(-np.linalg.norm(points - points.mean(axis=0), axis=1))]
     distances = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):
@@ -189,16 +190,18 @@ def spread(points: Floats, count: int) -> Floats:
 
 
 def _first_best(scores: Floats) -> int:
-    """The first index whose score is the maximum up to rounding."""
+    """Index of the first score that is equal to the maximum up to rounding."""
     return int(np.argmax(scores >= scores.max() - _TIES * np.abs(scores).max()))
 
 
 def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[list[Floats], Bools]:
-    """Lines from ``seeds`` (k, 3) along (``sign`` 1) or against (-1) the field to ``goal`` (m, 3), and a mask (k,) of arrival."""
+    """Follow the field from ``seeds`` (k, 3), in its direction (``sign`` 1) or against it (-1), to the triangles ``goal`` (m, 3).
+    Returns the lines and a mask (k,) of those that have arrived.
+    """
     step = sign * field.size / 4
     lines = [[seed] for seed in seeds]
     going, points, ascent = np.arange(len(seeds)), seeds, field.directions(seeds)
-    # A line four times as long as the mesh must run in circles.
+    # A line that is four times as long as the mesh must run in circles.
     for _ in range(4 * int(field.locator.diagonal / abs(step))):
         points = _runge_kutta(field, points, ascent, step)
         ascent, goes_on = field.sampled(points)
@@ -214,7 +217,7 @@ def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[
 
 
 def _runge_kutta(field: FibreField, points: Floats, first: Floats, step: float) -> Floats:
-    """``points`` (k, 3) advanced by one ``step`` [mm] with the classical fourth-order Runge-Kutta method. ``first`` (k, 3): the
+    """Advance ``points`` (k, 3) by one ``step`` [mm] with the classical fourth-order Runge-Kutta method. ``first`` (k, 3): the
     directions at the points.
     """
     second = field.directions(points + step / 2 * first)
@@ -224,7 +227,7 @@ def _runge_kutta(field: FibreField, points: Floats, first: Floats, step: float) 
 
 
 def resample(line: Floats) -> Floats:
-    """The line (k, 3) resampled at 40 points, equally spaced along it."""
+    """Resample the line (k, 3) at 40 points, equally spaced along it."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     at = np.linspace(0, along[-1], POINTS)
     return np.stack([np.interp(at, along, line[:, axis]) for axis in range(3)], axis=1)

@@ -1,6 +1,6 @@
-"""Meshes of scalar fields: intervals and triangles, in the plane or in space; their sizes, boundary and refinement.
+"""Meshes of scalar fields: intervals and triangles, in the plane or in space, with their sizes, boundary and refinement.
 
-Array shapes: points ``(n, d)`` with d from 1 to 3, cells ``(m, 2)`` of an interval (d = 1) or ``(m, 3)`` of triangles.
+Shapes of arrays: points ``(n, d)`` with d from 1 to 3; cells ``(m, 2)`` of an interval (d = 1) or ``(m, 3)`` of triangles.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from fem_reference.foundations.rows import distinct
 
 @dataclass(frozen=True, eq=False)
 class FieldMesh:
-    """Straight ``cells`` between ``points``; ``place`` is their source, for messages."""
+    """A mesh of straight ``cells`` between ``points``; ``place`` names the source of the mesh in messages."""
 
     points: Floats
     cells: Ints
@@ -29,30 +29,30 @@ class FieldMesh:
 
     @property
     def edges(self) -> Ints:
-        """Every edge once (e, 2), the smaller vertex first, in the order of their vertices."""
+        """All edges (e, 2), each once and with the smaller vertex first, sorted by their vertices."""
         return distinct(_all_edges(self.cells)).rows
 
     @property
     def facets(self) -> Ints:
-        """The facets that belong to one cell only: the end vertices (f, 1) of an interval, the rim edges (f, 2) of triangles."""
+        """Facets that belong to only one cell: the end vertices (f, 1) of an interval, or the rim edges (f, 2) of triangles."""
         parts = self.cells.reshape(-1, 1) if self.cells.shape[1] == 2 else _all_edges(self.cells)
         found = distinct(parts)
         return found.rows[found.counts == 1]
 
     def edge_numbers(self, pairs: Ints) -> Ints:
-        """The index (k,) in ``edges`` of each of the ``pairs`` (k, 2) of vertices; all must be edges."""
+        """Index (k,) in ``edges`` of each pair of vertices in ``pairs`` (k, 2), which must be an edge."""
         key = np.array([len(self.points), 1])
         return np.asarray(np.searchsorted(self.edges @ key, np.sort(pairs, axis=1) @ key))
 
     @property
     def nodes(self) -> dict[int, Floats]:
-        """The positions of the nodes of Lagrange elements of order 1 and 2: the vertices, then the midpoints of the edges."""
+        """Positions of the nodes of Lagrange elements of order 1 and 2: the vertices, followed for order 2 by edge midpoints."""
         middles = self.points[self.edges].mean(axis=1)
         return {1: self.points, 2: np.concatenate([self.points, middles])}
 
     @property
     def sizes(self) -> Floats:
-        """Length or area of each cell (m,)."""
+        """Length or area (m,) of each cell."""
         corners = self.points[self.cells]
         sides = corners[:, 1:] - corners[:, :1]
         gram = np.einsum("mid,mjd->mij", sides, sides)
@@ -60,12 +60,12 @@ class FieldMesh:
 
 
 POINTS = 5  # the number of quadrature points along each direction: exact up to degree 9
-# The largest allowed coordinate, so that areas and results computed from it are finite.
+# The maximum magnitude of a coordinate, chosen so that areas and results computed from it are finite.
 FURTHEST = 1e50
 
 
 def check(mesh: FieldMesh) -> FieldMesh:
-    """``mesh`` itself; InputError for non-finite numbers, wrong indices, unused vertices, flat cells, edges of 3 or more cells."""
+    """Return ``mesh``; InputError for wrong coordinates or indices, unused vertices, flat cells, or edges of 3 or more cells."""
     count = len(mesh.points)
     if not np.isfinite(mesh.points).all():
         raise InputError(mesh.place, "a coordinate that is not a finite number", "finite coordinates")
@@ -89,17 +89,18 @@ def check(mesh: FieldMesh) -> FieldMesh:
 
 
 def barycentric_gradients(mesh: FieldMesh) -> Floats:
-    """The gradients (m, k, d) of the hat functions of each cell's k vertices, tangential to the cell."""
+    """Gradients (m, k, d) of the hat functions of the k vertices of each cell, tangential to the cell."""
     corners = mesh.points[mesh.cells]
     slopes = np.linalg.pinv(corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
     return np.asarray(np.concatenate([-slopes.sum(axis=1, keepdims=True), slopes], axis=1))
 
 
 def share_above(mesh: FieldMesh, level: float) -> Floats:
-    """The fraction (m,) of each triangle's area with y above ``level``."""
+    """Fraction (m,) of each triangle's area in which y is above ``level``."""
     heights = np.sort(mesh.points[mesh.cells][:, :, 1] - level, axis=1)
     low, middle, high = heights.T
-    # The corner alone on its side of the level is cut off; its fraction of the area is the product of its edges' fractions.
+    # The level cuts off the corner that is alone on its side. The corner's fraction of the area is the product of the fractions cut
+    # off its two edges.
     with np.errstate(divide="ignore", invalid="ignore"):
         top = np.where(high > 0, high**2 / ((high - low) * (high - middle)), 0.0)
         bottom = np.where(low < 0, low**2 / ((high - low) * (middle - low)), 0.0)
@@ -108,11 +109,11 @@ def share_above(mesh: FieldMesh, level: float) -> Floats:
 
 
 def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: int) -> tuple[float, Floats]:
-    """The maximum Peclet number of all cells, and for each (m,) the upwinding parameter ``tau = h / 2|v| (coth Pe - 1 / Pe)``.
+    """Return the maximum Peclet number of the cells, and their upwinding parameters ``tau = h / 2|v| (coth Pe - 1 / Pe)`` (m,).
 
     ``Pe = |v| h / 2k``, with the ``diffusion`` k and the part v of the ``velocity`` (d,) along the cell (Brooks and Hughes 1982,
-    doi 10.1016/0045-7825(82)90071-8). The distance h of nodes along v is ``2|v| / sum |v . grad lambda|`` divided by the ``order``
-    of the elements (Tezduyar 1986). On an interval, tau makes linear elements exact at their nodes for constant coefficients.
+    doi 10.1016/0045-7825(82)90071-8). The distance h between nodes along v is ``2|v| / sum |v . grad lambda|``, divided by the
+    ``order`` of the elements (Tezduyar 1986). For constant coefficients on an interval, tau makes linear elements exact at nodes.
     """
     slopes = barycentric_gradients(mesh)
     rates = np.abs(slopes @ velocity).sum(axis=1) * order / 2  # |v| / h
@@ -120,13 +121,13 @@ def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: in
     along = np.einsum("mid,mik,k->md", tangents, slopes[:, 1:], velocity)
     with np.errstate(divide="ignore", invalid="ignore"):
         peclet = np.where(rates > 0, (along**2).sum(axis=1) / (2 * diffusion * rates), 0.0)
-        # Below 1e-3 the difference suffers cancellation; its series is Pe / 3 - Pe^3 / 45 + ...
+        # Below 1e-3 the difference suffers from cancellation, so its series Pe / 3 - Pe^3 / 45 + ... is used.
         upwind = np.where(peclet > 1e-3, 1 / np.tanh(peclet) - 1 / peclet, peclet / 3)
         return float(peclet.max()), np.where(rates > 0, upwind / (2 * rates), 0.0)
 
 
 def refined(mesh: FieldMesh) -> FieldMesh:
-    """Intervals cut in two, or triangles in four, at edge midpoints; vertex i keeps its index, and edge j gives vertex n + j."""
+    """Cut intervals in two, or triangles in four, at edge midpoints. Vertex i keeps its index; edge j becomes vertex n + j."""
     cells: list[tuple[Ints, ...]]
     if mesh.cells.shape[1] == 2:
         a, b, ab = nodes(mesh, 2).T
@@ -138,15 +139,16 @@ def refined(mesh: FieldMesh) -> FieldMesh:
 
 
 def _all_edges(cells: Ints) -> Ints:
-    """The edges of every cell, cell by cell, (m or 3 m, 2), the smaller vertex first."""
+    """Edges (m or 3 m, 2) of all cells, cell by cell, with the smaller vertex first."""
     pairs = cells[:, [[0, 1]]] if cells.shape[1] == 2 else cells[:, [[0, 1], [1, 2], [2, 0]]]
     return np.asarray(np.sort(pairs.reshape(-1, 2), axis=1))
 
 
 def l2_distance(mesh: FieldMesh, values: Floats, exact: Callable[[Floats], Floats]) -> float:
-    """The L2 norm, over a ``mesh`` in the plane or in space, of a Lagrange function minus an ``exact`` function, which gives values
-    (q,) at points (q, d). The Lagrange function has ``values`` (N,) at the nodes: the vertices, followed for order 2 by the
-    midpoints of ``mesh.edges``.
+    """L2 norm of the difference between a Lagrange function and an ``exact`` function, over a ``mesh`` in the plane or in space.
+
+    ``values`` (N,): the Lagrange function at the nodes, which are the vertices, followed for order 2 by the midpoints of
+    ``mesh.edges``. ``exact`` takes points (q, d) and returns values (q,).
     """
     order = 1 if len(values) == len(mesh.points) else 2
     barycentric, weights = rule(mesh.cells.shape[1])
@@ -158,9 +160,10 @@ def l2_distance(mesh: FieldMesh, values: Floats, exact: Callable[[Floats], Float
 
 @cache
 def rule(corners: int) -> tuple[Floats, Floats]:
-    """Barycentric coordinates (q, k) of the points of a quadrature rule for cells with k ``corners``, 2 or 3, and its weights (q,),
-    whose sum is 1. The rule is Gauss-Legendre; in a triangle, its product with Gauss-Jacobi along lines through a corner (Stroud
-    1971, Approximate Calculation of Multiple Integrals, 2.4).
+    """Return a quadrature rule for cells with k = 2 or 3 ``corners``: barycentric coordinates (q, k), and weights (q,) with sum 1.
+
+    It is a Gauss-Legendre rule; in a triangle, its product with a Gauss-Jacobi rule along lines through a corner (Stroud 1971,
+    Approximate Calculation of Multiple Integrals, 2.4).
     """
     x, w = scipy.special.roots_legendre(POINTS)
     along, weights = (1 + x) / 2, w / 2
@@ -173,7 +176,7 @@ def rule(corners: int) -> tuple[Floats, Floats]:
 
 
 def nodes(mesh: FieldMesh, order: int) -> Ints:
-    """The nodes (m, k) of each cell: its corners, then for order 2 the midpoints of its edges, from each corner to the next."""
+    """Nodes (m, k) of each cell: its corners, followed for order 2 by the midpoints of its edges, from each corner to the next."""
     if order == 1:
         return mesh.cells
     middles = mesh.edge_numbers(_all_edges(mesh.cells)).reshape(len(mesh.cells), -1)
@@ -181,7 +184,7 @@ def nodes(mesh: FieldMesh, order: int) -> Ints:
 
 
 def functions(barycentric: Floats, order: int) -> Floats:
-    """The Lagrange functions (q, k) at ``barycentric`` coordinates (q, 2 or 3), in the order of :func:`nodes`.
+    """Lagrange basis functions (q, k) at ``barycentric`` coordinates (q, 2 or 3), in the order of :func:`nodes`.
 
     Order 2: ``L_i (2 L_i - 1)`` at corners and ``4 L_i L_j`` at midpoints (Zienkiewicz and Taylor, The Finite Element Method, 8.8).
     """

@@ -1,8 +1,8 @@
 """Fibres by area: streamlines of a potential flow that enters a muscle evenly over one attachment and leaves evenly over the other.
 
-The flux per area of an attachment is constant, so lines that start evenly over one attachment end evenly over the other, and cover
-both areas. In contrast, the gradient of a potential that is constant on attachments is concentrated at their rims. In a sheet with
-a fully attached face, nearly all its lines start at the edge next to the other attachment.
+The flux per area of an attachment is constant, so lines that start evenly over one attachment end evenly over the other, and both
+areas are covered. In contrast, the gradient of a potential that is constant on each attachment is concentrated at the rims; in a
+sheet with a fully attached face, nearly all lines would start at the edge next to the other attachment.
 """
 
 from dataclasses import dataclass
@@ -26,14 +26,14 @@ from fem_reference.foundations.mesh import (
 from fem_reference.geometry.fibres import POINTS, FibreField, averaged, resample, spread
 
 MOST = 1000  # the maximum number of fibres
-_LINES, _LINES_EACH = 1000, 8  # the minimum number of lines in all, and per fibre; fibres are chosen among these lines
+_LINES, _LINES_EACH = 1000, 8  # the minimum number of lines in total and per fibre; fibres are chosen among them
 _ROUNDS = 50  # the maximum number of iterations of Lloyd's algorithm, which converges in fewer
 _PLASTIC = 1.324717957244746  # x^3 = x + 1: its powers spread points evenly (Roberts 2018, the R2 sequence)
 
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """A divergence-free flow through the tetrahedra of a ``mesh`` with a total flux of 1 from the facets ``start`` (m, 3) to
+    """A divergence-free flow through the tetrahedra of a ``mesh``, with a total flux of 1 from the facets ``start`` (m, 3) to
     ``end``. Each tetrahedron has the constant flow ``slopes`` (k, 3) [1/mm2], the indices ``faces`` (k, 4) of the triangles
     opposite its corners, and the gradients ``rises`` (k, 4, 3) [1/mm] of its barycentric coordinates.
     """
@@ -47,17 +47,17 @@ class Flow:
 
     @property
     def field(self) -> FibreField:
-        """The directions of the flow, continuous: at each point the flow in the tetrahedra around it, averaged by volume."""
+        """Directions of the flow as a continuous field: at each point, the volume average over the tetrahedra around it."""
         no_values = np.full(len(self.mesh.points), np.nan)  # the potential is not constant on attachments
         return FibreField(self.mesh, no_values, averaged(self.mesh, self.slopes), self.start, self.end)
 
 
 def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
-    """The flow from the facets ``start`` of a ``mesh`` to ``end``, uniform over the area of each and 0 through the rest of the
-    boundary. It is the gradient of a potential with ``-laplace u = 0`` and ``du/dn = -1/A_start``, ``1/A_end`` or 0.
+    """Compute the flow from the facets ``start`` of a ``mesh`` to ``end``, uniform over the area of both and 0 through the rest of
+    the boundary. It is the gradient of a potential u with ``-laplace u = 0`` and ``du/dn = -1/A_start``, ``1/A_end`` or 0.
 
     The elements are of the Crouzeix-Raviart type. Their gradients are lowest-order Raviart-Thomas fields, so the flux out of a
-    tetrahedron is exactly the flux into the next (Marini 1985, SIAM J. Numer. Anal. 22:493).
+    tetrahedron equals the flux into the next exactly (Marini 1985, SIAM J. Numer. Anal. 22:493).
     """
     triangles = _triangles(mesh)
     _, first, numbers = np.unique(triangles, axis=0, return_index=True, return_inverse=True)
@@ -72,17 +72,17 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
     for facets, sign in ((mesh.facets[start], -1.0), (mesh.facets[end], 1.0)):
         areas = triangle_areas(mesh.points, facets)
         through[_numbers(triangles[first], facets)] += sign * areas / areas.sum()
-    potential = np.zeros(count)  # defined up to a constant: 0 on the first face
+    potential = np.zeros(count)  # defined up to a constant, chosen as 0 on the first face
     potential[1:] = splu(matrix[1:, 1:]).solve(through[1:])
     slopes = -3 * np.einsum("ki,kia->ka", potential[faces], rises)
     return Flow(mesh, mesh.facets[start], mesh.facets[end], faces, rises, slopes)
 
 
 def streamlines(flux: Flow, count: int) -> Polylines:
-    """``count`` lines of 40 points along a ``flux``, each for an equal area of both attachments; InputError if fewer can be traced.
+    """Compute ``count`` lines of 40 points along ``flux``, each for an equal area of both attachments; InputError for too few.
 
-    Many lines start evenly over the area; the selected lines are the middles of groups that are compact at both ends (Lloyd 1982),
-    measured in units of the size of each attachment.
+    More lines are started evenly over the area and grouped so that the groups are compact at both ends (Lloyd 1982), with distances
+    in units of the size of each attachment. The central line of each group is returned.
     """
     if count > MOST:
         raise InputError("fibres.traced.count", count, f'at most {MOST} with flux = "area"')
@@ -96,18 +96,18 @@ def streamlines(flux: Flow, count: int) -> Polylines:
 
 
 def _triangles(mesh: TetMesh) -> Ints:
-    """The corners (4 k, 3) of the triangles of each tetrahedron, sorted within each triangle."""
+    """Corners (4 k, 3) of the four triangles of each tetrahedron, sorted within each triangle."""
     return np.asarray(np.sort(mesh.tets[:, TET_FACES].reshape(-1, 3), axis=1))
 
 
 def _numbers(triangles: Ints, facets: Ints) -> Ints:
-    """The index (m,) of each of ``facets`` (m, 3) among the distinct ``triangles`` (n, 3), whose corners are sorted."""
+    """Index (m,) of each of ``facets`` (m, 3) among the distinct ``triangles`` (n, 3), whose corners are sorted."""
     _, numbers = np.unique(np.concatenate([triangles, np.sort(facets, axis=1)]), axis=0, return_inverse=True)
     return np.asarray(numbers.ravel()[len(triangles) :])
 
 
 def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:
-    """``count`` points (n, 3) [mm], spread evenly over the area where the flow begins, and the tetrahedron (n,) of each."""
+    """Spread ``count`` points evenly over the area where the flow begins; returns their tetrahedra (n,) and the points (n, 3)."""
     mesh, facets = flux.mesh, flux.start
     shares = np.cumsum(triangle_areas(mesh.points, facets))
     facet = np.searchsorted(shares / shares[-1], (np.arange(count) + 1 / _PLASTIC) / count)  # never on a facet's rim
@@ -122,7 +122,7 @@ def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:
 
 
 def _followed(flux: Flow, tets: Ints, points: Floats) -> list[Floats]:
-    """The lines (n, 3) from ``points`` (k, 3) in ``tets`` (k,) that leave through the end of the flow, straight in each tet."""
+    """Lines (n, 3) from ``points`` (k, 3) in ``tets`` (k,) that leave through the end of the flow, straight inside each tet."""
     beyond, going, met = _neighbours(flux.faces), np.arange(len(points)), np.full(len(points), -1)
     passed, arrives, ends = [(going, points)], np.zeros(len(points), bool), _numbers(_triangles(flux.mesh), flux.end)
     for _ in range(len(flux.mesh.tets)):  # a line passes through each tetrahedron at most once
@@ -147,7 +147,7 @@ def _followed(flux: Flow, tets: Ints, points: Floats) -> list[Floats]:
 
 
 def _neighbours(faces: Ints) -> Ints:
-    """The tetrahedron (k, 4) beyond each of the ``faces`` (k, 4) of tetrahedra, -1 on the boundary."""
+    """Index (k, 4) of the tetrahedron on the other side of each of the ``faces`` (k, 4) of tetrahedra, -1 on the boundary."""
     order = np.argsort(faces.ravel(), kind="stable")
     twice = np.flatnonzero(np.diff(faces.ravel()[order]) == 0)
     one, other = order[twice], order[twice + 1]
@@ -157,7 +157,7 @@ def _neighbours(faces: Ints) -> Ints:
 
 
 def _middles(points: Floats, count: int) -> Ints:
-    """The indices of at most ``count`` of ``points`` (n, d): in each group of Lloyd's algorithm the point nearest to the middle."""
+    """Indices of at most ``count`` of ``points`` (n, d): the point nearest to the mean of each group found by Lloyd's algorithm."""
     middles = spread(points, count)
     for _ in range(_ROUNDS):
         _, group = cKDTree(middles).query(points)

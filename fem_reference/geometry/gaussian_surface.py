@@ -1,4 +1,4 @@
-"""Closed surfaces as level sets of a few Gaussians (report 7.1; Carr et al. 2001, doi 10.1145/383259.383266)."""
+"""Closed surfaces as level sets of a sum of Gaussians (report 7.1; Carr et al. 2001, doi 10.1145/383259.383266)."""
 
 from dataclasses import dataclass
 
@@ -11,29 +11,32 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume
 from fem_reference.geometry.distance import farthest_points
 
-# Numbers of points inside the surface from which the first centres are chosen, and of vertices in the fit.
+# The number of points inside the surface from which the initial centres are chosen, and the number of vertices used in the fit.
 _INSIDE, _SAMPLES = 20_000, 1500
-# The distance of samples on both sides of the surface, relative to the edge of a cube of the same volume.
+# The distance from the surface of the samples on both sides of it, relative to the edge of a cube with the volume of the surface.
 _BESIDE = 0.05
-# Rounds of the fit, each with the gradients of the level at the samples from the previous round, and evaluations per round.
+# The number of rounds of the fit, each of which uses the gradients of the level at the samples from the previous round, and the
+# number of evaluations in each round.
 _ROUNDS, _STEPS = 6, 8
-# The minimum and the maximum radius, relative to the edge of a cube of the same volume.
+# The minimum and the maximum radius of a Gaussian, relative to the edge of a cube with the volume of the surface.
 _RADII = (0.02, 2.0)
-# The maximum number of Newton steps, and the tolerance: the longest step divided by the least radius.
+# The maximum number of Newton steps, and their tolerance: the longest step divided by the smallest radius.
 _PROJECTIONS, _THERE = 12, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class GaussianSurface:
-    """The surface on which ``sum_i exp(-|x - centres_i|^2 / radii_i^2)`` is 1: ``centres`` (m, 3) and ``radii`` (m,) [mm], four
-    numbers for each Gaussian. A single Gaussian gives a point; n Gaussians at one centre give a sphere of radius ``r sqrt(log n)``.
+    """The surface on which ``sum_i exp(-|x - centres_i|^2 / radii_i^2)`` is 1. ``centres`` (m, 3) and ``radii`` (m,) [mm] are four
+    parameters for each Gaussian. One Gaussian gives a point; n Gaussians at one centre give a sphere of radius ``r sqrt(log n)``.
     """
 
     centres: Floats
     radii: Floats
 
     def level(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Log of the sum (n,) at ``points`` (n, 3), positive inside; its gradient (n, 3) [1/mm]; shares (n, m) of the Gaussians."""
+        """Return three quantities at ``points`` (n, 3): the log of the sum (n,), which is positive inside the surface; its gradient
+        (n, 3) [1/mm]; and the share (n, m) of each Gaussian in the sum.
+        """
         exponents = -cdist(points, self.centres, "sqeuclidean") / self.radii**2
         level = scipy.special.logsumexp(exponents, axis=1)
         shares = np.exp(exponents - level[:, None])
@@ -41,7 +44,7 @@ class GaussianSurface:
         return level, weights @ self.centres - points * weights.sum(axis=1)[:, None], shares
 
     def project(self, points: Floats, levels: Floats | float = 0.0) -> Floats:
-        """``points`` (n, 3) moved along the gradient to ``levels`` (n,) by Newton steps shorter than the least radius."""
+        """Move ``points`` (n, 3) along the gradient to ``levels`` (n,), by Newton steps no longer than the smallest radius."""
         longest = float(self.radii.min())
         for _ in range(_PROJECTIONS):
             level, gradient, _ = self.level(points)
@@ -55,9 +58,11 @@ class GaussianSurface:
 
 
 def fit(surface: Surface, count: int) -> GaussianSurface:
-    """The surface of ``count`` Gaussians nearest to a closed ``surface``: nonlinear least squares of distances at vertices and at
-    points on both sides of them, robust against outliers. The fit is deterministic. A rotated or scaled surface gives the
-    rotated or scaled fit, up to rounding, if its principal axes are distinct.
+    """Fit ``count`` Gaussians to a closed ``surface``, by nonlinear least squares of the distances at vertices and at points on
+    both sides of them, robust against outliers.
+
+    The fit is deterministic. Rotating or scaling the surface rotates or scales the fit, up to rounding, if the principal axes of
+    the surface are distinct.
     """
     middle, size = surface.points.mean(axis=0), float(np.cbrt(enclosed_volume(surface.points, surface.triangles)))
     axes = _axes(surface.points - middle)
@@ -66,7 +71,7 @@ def fit(surface: Surface, count: int) -> GaussianSurface:
 
 
 def _fit(surface: Surface, count: int) -> GaussianSurface:
-    """The fit to a ``surface`` of volume 1 whose principal axes are the coordinate axes."""
+    """Fit ``count`` Gaussians to a ``surface`` of volume 1 whose principal axes are the coordinate axes."""
     bounds, inside = np.log(_RADII), _inside(surface)
     if not 2 <= count <= len(inside):
         raise InputError("gaussians", count, f"2 to {len(inside)}, the number of points inside the surface")
@@ -95,13 +100,13 @@ def _fit(surface: Surface, count: int) -> GaussianSurface:
 
 
 def _surface(unknowns: Floats) -> GaussianSurface:
-    """The surface of these ``unknowns``: centres, then logarithms of radii."""
+    """Return the surface for the ``unknowns``: the centres, followed by the logarithms of the radii."""
     count = len(unknowns) // 4
     return GaussianSurface(unknowns[: 3 * count].reshape(count, 3), np.exp(unknowns[3 * count :]))
 
 
 def _slopes(surface: GaussianSurface, points: Floats) -> Floats:
-    """The derivatives (n, 4 m) of the level at ``points`` (n, 3) with respect to the unknowns."""
+    """Derivatives (n, 4 m) of the level at ``points`` (n, 3) with respect to the unknowns."""
     weights = 2 * surface.level(points)[2] / surface.radii**2
     away = points[:, None] - surface.centres
     by_centre = weights[:, :, None] * away
@@ -109,7 +114,7 @@ def _slopes(surface: GaussianSurface, points: Floats) -> Floats:
 
 
 def _samples(surface: Surface) -> tuple[Floats, Floats]:
-    """Points (k, 3): vertices, and points on both sides of the vertices; and their distances (k,) from the surface."""
+    """Return points (k, 3), which are vertices and points on both sides of them, and their distances (k,) from the surface."""
     some = farthest_points(surface.points, _SAMPLES)
     points, normals = surface.points[some], igl.per_vertex_normals(surface.points, surface.triangles)[some]
     sides = np.array([0.0, _BESIDE, -_BESIDE])
@@ -117,14 +122,14 @@ def _samples(surface: Surface) -> tuple[Floats, Floats]:
 
 
 def _axes(away: Floats) -> Floats:
-    """The principal axes (3, 3) of points ``away`` (n, 3) from their mean, right-handed, the first two towards the longer tail."""
+    """Principal axes (3, 3) of points at ``away`` (n, 3) from their mean, right-handed, the first two towards the longer tail."""
     axes = np.linalg.svd(away, full_matrices=False)[2]
     first, second = np.where(((away @ axes[:2].T) ** 3).sum(axis=0)[:, None] < 0, -axes[:2], axes[:2])
     return np.stack([first, second, np.cross(first, second)])
 
 
 def _inside(surface: Surface) -> Floats:
-    """The nodes (k, 3) of a cubic grid that are inside the ``surface``."""
+    """Nodes (k, 3) of a cubic grid that are inside the ``surface``."""
     step = float(np.cbrt(1 / _INSIDE))
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     ticks = [np.arange(start + step / 2, end, step) for start, end in zip(low, high, strict=True)]

@@ -1,4 +1,4 @@
-"""The depth to which two closed surfaces penetrate each other, from their triangles alone."""
+"""Depth to which two closed surfaces penetrate each other, computed from their triangles alone."""
 
 import numpy as np
 
@@ -6,13 +6,13 @@ from fem_reference.foundations.mesh import Floats, Surface, TetMesh, boundary
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings
 
-# Sample points of a triangle that crosses the other surface: its corners, and a regular grid between them.
+# Sample points of a triangle that crosses the other surface, in barycentric coordinates: a regular grid with the corners.
 _GRID = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6
 
 
 def penetration(one: Surface, other: Surface) -> tuple[float, Floats]:
-    """The depth [mm] to which two closed surfaces penetrate each other, 0 if they are apart, and its place (3,). It is the maximum
-    over all vertices, and over 28 sample points on each triangle that crosses the other surface.
+    """Return the depth [mm] to which two closed surfaces penetrate each other, 0 if they are apart, and the point (3,) of that
+    depth. It is the maximum over all vertices and over 28 sample points on each triangle that crosses the other surface.
     """
     pairs = crossings(one, other)
     depths, places = [np.zeros(1)], [one.points[:1]]
@@ -31,5 +31,5 @@ def penetration(one: Surface, other: Surface) -> tuple[float, Floats]:
 
 
 def skin_of(mesh: TetMesh) -> Surface:
-    """The boundary triangles of a ``mesh``, with all its points."""
+    """Return the boundary triangles of a ``mesh`` as a surface with all points of the mesh."""
     return Surface(mesh.points, boundary(mesh.tets)[0])

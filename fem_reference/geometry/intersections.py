@@ -1,4 +1,4 @@
-"""Intersections of triangle surfaces, with themselves and with each other."""
+"""Intersections of triangle surfaces with themselves and with each other."""
 
 import numpy as np
 from igl import predicates
@@ -10,14 +10,14 @@ from fem_reference.geometry.near_pairs import near_pairs
 
 
 def self_intersections(surface: Surface) -> Ints:
-    """The triangles (k,), sorted, that intersect another triangle through an edge of either."""
+    """Sorted indices (k,) of the triangles that intersect another triangle, that is, an edge of one pierces the other."""
     return np.unique(self_crossings(surface))
 
 
 def self_crossings(surface: Surface) -> Ints:
-    """Pairs (k, 2) of triangles with an edge of one that pierces the other.
+    """Pairs (k, 2) of triangles in which an edge of one triangle pierces the other.
 
-    Edges that share a vertex with the other triangle do not count, nor do triangles that touch, or overlap in one plane.
+    Edges that share a vertex with the other triangle do not count, nor do triangles that touch or that overlap in one plane.
     """
     near = near_pairs(surface, surface)
     some = np.arange(len(surface.triangles)) if near is None else np.unique(near)
@@ -34,7 +34,7 @@ def self_crossings(surface: Surface) -> Ints:
 
 
 def crossings(one: Surface, other: Surface) -> Ints:
-    """Pairs (k, 2) of triangles of two surfaces that intersect or touch, decided exactly by the predicates of Shewchuk 1997."""
+    """Pairs (k, 2) of triangles of two surfaces that intersect or touch, found with the exact predicates of Shewchuk 1997."""
     found = near_pairs(one, other)
     sides = (within(one, *bounds(other)), within(other, *bounds(one))) if found is None else map(np.unique, found.T)
     near = tuple(sides)
@@ -49,14 +49,14 @@ def crossings(one: Surface, other: Surface) -> Ints:
 
 
 def overlaps(one: Floats, other: Floats) -> Floats:
-    """Penetration (k,) [mm] of triangles ``one`` and ``other`` (k, 3, 3) that cross: the shortest displacement along the normal of
-    either that moves the other triangle to one side of the plane; 0 if either has no area.
+    """Penetration (k,) [mm] of crossing triangles ``one`` and ``other`` (k, 3, 3): the shortest displacement along the normal of
+    either triangle that moves the other one entirely to one side of that triangle's plane; 0 if either triangle has no area.
     """
     return np.asarray(np.nan_to_num([_reach(one, other), _reach(other, one)]).min(axis=0))
 
 
 def _reach(triangles: Floats, walls: Floats) -> Floats:
-    """Depth (k,) of ``triangles`` beyond the planes of ``walls``, on the side where it is smaller; NaN if a wall has no area."""
+    """Depth (k,) of ``triangles`` behind the planes of ``walls``, on the side where it is smaller; NaN if a wall has no area."""
     with np.errstate(invalid="ignore", divide="ignore"):
         across = (found := normals(walls)) / np.linalg.norm(found, axis=1)[:, None]
     heights = np.einsum("kci,ki->kc", triangles - walls[:, :1], across)

@@ -1,4 +1,4 @@
-"""A cache on disk for tetrahedra and other arrays that take long to make: written atomically, and made again if damaged."""
+"""Disk cache for tetrahedra and other arrays that take long to compute. Files are written atomically and replaced if damaged."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fem_reference import foundations
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, fingerprint
 from fem_reference.foundations.version import versions
 from fem_reference.io import files
@@ -21,11 +22,11 @@ _FACETS = "facets "
 
 
 def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, Floats], folder: Path | None) -> TetMesh:
-    """The tetrahedra that ``mesher`` makes from a surface, ``size`` [mm] and ``shares``, as in
+    """Return the tetrahedra that ``mesher`` makes from a surface, ``size`` [mm] and ``shares``, as in
     :func:`fem_reference.geometry.tetrahedra.tetrahedralise`.
 
-    They are stored in ``folder``, if any, under a hash of everything on which they depend, including the code of this package and
-    the versions of packages that make meshes.
+    If there is a ``folder``, the tetrahedra are stored there under a hash of everything on which they depend, including the code of
+    :mod:`fem_reference.foundations` and :mod:`fem_reference.geometry` and the versions of packages that make meshes.
     """
     if folder is None:
         return mesher(surface, size, shares)
@@ -36,10 +37,15 @@ def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, F
 
 @cache
 def code() -> str:
-    """A hash of all source files of this package, and of the versions of the packages that make meshes."""
-    folder = Path(__file__).parent
-    sources = [np.frombuffer(path.read_bytes(), np.uint8) for path in sorted(folder.glob("*.py"))]
-    return f"{fingerprint(*sources)} {versions(_MADE_WITH)}"
+    """Hash of the ``sources`` and of the versions of the packages that make meshes."""
+    contents = [np.frombuffer(path.read_bytes(), np.uint8) for path in sources()]
+    return f"{fingerprint(*contents)} {versions(_MADE_WITH)}"
+
+
+def sources() -> list[Path]:
+    """The source files with all code on which stored arrays depend: those of this folder and those of the foundations."""
+    folders = Path(foundations.__file__).parent, Path(__file__).parent
+    return [path for folder in folders for path in sorted(folder.glob("*.py"))]
 
 
 def _mesh(arrays: Arrays) -> TetMesh:
@@ -53,7 +59,7 @@ def _arrays(mesh: TetMesh) -> Arrays:
 
 
 def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays], of_arrays: Callable[[Arrays], T]) -> T:
-    """The value that ``of_arrays`` reads from the file at ``path``, else the result of ``make``, stored by ``to_arrays``."""
+    """Return what ``of_arrays`` reads from the file at ``path``; without a valid file, call ``make`` and store its result there."""
     found = _read(path, of_arrays)
     if found is None:
         found = make()
@@ -62,19 +68,19 @@ def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays],
 
 
 def _read[T](path: Path, of_arrays: Callable[[Arrays], T]) -> T | None:
-    """The value in a file, None if it is missing or cannot be read completely."""
+    """Read the value in a file; None if the file is missing or cannot be read completely."""
     if not path.is_file():
         return None
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             return of_arrays(dict(arrays))
     except Exception as error:  # zipfile and numpy raise many types of errors on a damaged file
-        log.warning("%s: the stored arrays are damaged and are made again: %s", path, error)
+        log.warning("%s: the stored arrays are damaged and are computed again: %s", path, error)
         return None
 
 
 def _write(path: Path, arrays: Arrays) -> None:
-    """Store arrays, safely for concurrent processes; warn if they cannot be written."""
+    """Store arrays, safely if several processes do so at the same time; log a warning if the file cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with files.whole(path) as part:

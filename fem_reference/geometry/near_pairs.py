@@ -1,4 +1,4 @@
-"""Pairs of triangles that may intersect, triangles near points, and parts of surfaces, by compiled loops (``near_pairs.c``)."""
+"""Pairs of triangles that may intersect, triangles near points, and connected parts, by compiled code (``near_pairs.c``)."""
 
 import ctypes
 from functools import cache, lru_cache
@@ -11,8 +11,8 @@ from fem_reference.foundations import native
 from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts
 from fem_reference.geometry.boxes import within
 
-# No -ffast-math: it reorders sums, and the bounds of their rounding errors would not hold.
-# Gathering three coordinates into a vector takes longer than it saves.
+# No -ffast-math: it reorders sums, and the bounds on their rounding errors would not hold. No vectorisation of straight-line code:
+# gathering three coordinates into a vector takes longer than it saves.
 _FLAGS = ("-O3", "-march=native", "-fno-tree-slp-vectorize")
 _ROOM = 1000
 _FARTHEST = 1e307  # [mm]
@@ -23,7 +23,7 @@ class _Triangles(ctypes.Structure):
 
     @classmethod
     def of(cls, surface: Surface) -> "_Triangles":
-        """The triangles of a ``surface``, which must outlive this object: no copy is made."""
+        """Refer to the triangles of a ``surface``, which must outlive this object because no copy is made."""
         return cls(len(surface.triangles), surface.points.ctypes.data, surface.triangles.ctypes.data)
 
 
@@ -40,14 +40,16 @@ class _Sorted:
             self.code.forget(self.grid)
 
 
-# Pairs with a bone are searched at many frames, always in the coordinates of the bone, so its sorted triangles are kept.
+# Pairs with a bone are searched in many frames, always in the bone's coordinates, so the bone's sorted triangles are cached.
 _kept = lru_cache(maxsize=8)(_Sorted)
 
 
 def near_pairs(one: Surface, other: Surface) -> Ints | None:
-    """Pairs (k, 2) of triangles of two surfaces, or of one surface with itself, that may intersect or touch: every pair that does,
-    once, and few others. Triangles of one surface that share an edge, or only touch at a common corner, are left out. None without
-    a compiler, or if a point is not finite or very far. The search is faster if ``other`` is the surface of an earlier call.
+    """Find pairs (k, 2) of triangles of two surfaces, or of one surface with itself, that may intersect or touch. Each pair that
+    does is found once, along with few that do not. Triangles of one surface that share an edge or touch only at a corner are left
+    out.
+
+    Returns None without a compiler, or if a point is not finite or very far away. Repeated calls with one ``other`` are faster.
     """
     code = _code()
     if code is None or not _moderate(one.points, other.points):
@@ -64,8 +66,8 @@ def near_pairs(one: Surface, other: Surface) -> Ints | None:
 
 
 def reached(surface: Surface, points: Floats, reach: Floats) -> Ints:
-    """The triangles (k,) whose bounding boxes come within ``reach`` (n,) [mm] of one of ``points`` (n, 3) along each axis: all that
-    do, and some others without a compiler, or if a point is not finite or very far.
+    """Indices (k,) of the triangles whose bounding boxes are within ``reach`` (n,) [mm] of one of ``points`` (n, 3) along each
+    axis. Without a compiler, or if a point is not finite or very far away, some triangles that are farther away are included.
     """
     if not len(points):
         return np.zeros(0, np.int64)
@@ -73,21 +75,21 @@ def reached(surface: Surface, points: Floats, reach: Floats) -> Ints:
     corners = np.stack([points.T - reach, points.T + reach]).transpose(0, 2, 1)
     if code is None or not _moderate(surface.points, corners):
         return within(surface, corners[0].min(axis=0), corners[1].max(axis=0))
-    # The box of a triangle with two equal corners is that of its ends.
+    # A triangle with two equal corners has the same bounding box as the segment between its distinct corners.
     boxes = _Sorted(Surface(corners.reshape(-1, 3), np.stack([numbers, numbers + len(points), numbers], axis=1)), code)
     found = np.empty(len(surface.triangles), np.int64)
     return found[: code.reached(_Triangles.of(surface), boxes.grid, found.ctypes.data)]
 
 
 def _moderate(*places: Floats) -> bool:
-    """True if all coordinates are finite and below ``_FARTHEST``, so that differences do not overflow."""
+    """True if all coordinates are finite and below ``_FARTHEST`` in magnitude, so that differences do not overflow."""
     return all(some.min(initial=0.0) > -_FARTHEST and some.max(initial=0.0) < _FARTHEST for some in places)
 
 
 @lru_cache(maxsize=16)
 def parts_of(surface: Surface) -> tuple[Ints, Ints]:
-    """The first vertex of each connected part (k,) of a ``surface``, and for each vertex (n,) the first vertex of its part; n - 1
-    is the last vertex of a triangle. ValueError if a vertex number is negative.
+    """Return the first vertex (k,) of each connected part of a ``surface``, and for each vertex (n,) the first vertex of its part,
+    where n - 1 is the highest vertex in the triangles. Raises ValueError if a vertex index is negative.
     """
     if surface.triangles.min(initial=0) < 0:
         raise ValueError("a triangle has a negative vertex number")

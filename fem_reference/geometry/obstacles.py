@@ -1,4 +1,4 @@
-"""Smooth obstacles of paths: quadrics (ellipsoids and cylinders) and tori, with level functions and their two derivatives."""
+"""Smooth obstacles of paths: quadrics (ellipsoids and cylinders) and tori, with level functions and their first two derivatives."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -8,13 +8,15 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints
 
-# A point this close to the middle of an obstacle, as a fraction of its size, is pushed out in an arbitrary direction.
+# A point this close to the centre of an obstacle, relative to its size, is pushed out in an arbitrary direction.
 _MIDDLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """Contacts of n paths with ``obstacles`` (n,): end points ``met``, ``left`` (n, 3) [mm], and tangents ``into``, ``out``."""
+    """Contacts of n paths with the ``obstacles`` (n,): the points (n, 3) [mm] at which each path arrives (``met``) and leaves
+    (``left``), and the tangents (n, 3) ``into`` and ``out`` of the contact.
+    """
 
     obstacles: Ints
     met: Floats
@@ -25,9 +27,9 @@ class Touch:
 
 @dataclass(frozen=True, eq=False)
 class Quadric:
-    """An ellipsoid with semi-axes ``radii`` (3,) [mm] along its own axes, placed by ``pose`` (4, 4).
+    """An ellipsoid with semi-axes ``radii`` (3,) [mm] along the axes of its ``pose`` (4, 4).
 
-    An infinite radius makes it a cylinder.
+    An infinite semi-axis makes it a cylinder.
     """
 
     pose: Floats
@@ -35,37 +37,37 @@ class Quadric:
 
     @property
     def bend(self) -> float:
-        """The smallest radius of curvature [mm], at the ends of the longest finite axis."""
+        """Smallest radius of curvature [mm], which occurs at the ends of the longest finite axis."""
         finite = self.radii[np.isfinite(self.radii)]
         return float(finite.min() ** 2 / finite.max())
 
     def moved(self, pose: Floats) -> Self:
-        """The surface moved by a ``pose`` (4, 4)."""
+        """Return the surface moved by ``pose`` (4, 4)."""
         return replace(self, pose=pose @ self.pose)
 
     def level(self, points: Floats) -> tuple[Floats, Floats]:
-        """The level (n,), which is the sum of (x / a)^2 minus 1, and its gradients (n, 3)."""
+        """Return the level (n,), the sum of (x / a)^2 minus 1, at ``points`` (n, 3), and its gradients (n, 3)."""
         own = self._own(points) / self.radii
         return np.vecdot(own, own) - 1, 2 * (own / self.radii) @ self.pose[:3, :3].T
 
     def bending(self, _: Floats, directions: Floats) -> Floats:
-        """The second derivative (n,) of the level along ``directions`` (n, 3), the same at all points."""
+        """Second derivative (n,) of the level along ``directions`` (n, 3); it is the same at all points."""
         own = directions @ self.pose[:3, :3] / self.radii
         return np.asarray(2 * np.vecdot(own, own))
 
     def curving(self, points: Floats, directions: Floats) -> Floats:
-        """The second derivatives (n, 3) by length of geodesics through ``points`` along ``directions`` (n, 3)."""
+        """Second derivatives (n, 3) by arc length of the geodesics through ``points`` (n, 3) along ``directions`` (n, 3)."""
         slope = (points - self.pose[:3, 3]) @ self._form
         return np.asarray((-np.vecdot(directions @ self._form, directions) / np.vecdot(slope, slope))[:, None] * slope)
 
     @cached_property
     def _form(self) -> Floats:
-        """The matrix (3, 3) of half the second derivatives of the level."""
+        """Matrix (3, 3) of half the second derivatives of the level."""
         turn = self.pose[:3, :3] / self.radii
         return np.asarray(turn @ turn.T)
 
     def pushed(self, points: Floats) -> Floats:
-        """``points`` (n, 3), with points inside moved to the surface along its normal, and deep ones first moved off the axis."""
+        """Move ``points`` (n, 3) that are inside to the surface along its normal; points near the axis are first moved off it."""
         own, thin = self._own(points), int(np.argmin(self.radii))
         own[np.sum((own / self.radii) ** 2, axis=1) < _MIDDLE**2, thin] = _MIDDLE * self.radii[thin]
         size = np.sqrt(np.sum((own / self.radii) ** 2, axis=1))
@@ -78,7 +80,7 @@ class Quadric:
         return np.asarray(moved)
 
     def deepest(self, begins: Floats, ends: Floats) -> Floats:
-        """The positions on segments from ``begins`` to ``ends`` (..., 3), as fractions of the length, with the least level."""
+        """Positions of the lowest level on the segments from ``begins`` to ``ends`` (..., 3), as fractions of their length."""
         one, other = self._own(begins) / self.radii, self._own(ends) / self.radii
         along = other - one
         return np.asarray(np.clip(-np.vecdot(one, along) / np.maximum(np.vecdot(along, along), 1e-300), 0, 1))
@@ -100,24 +102,24 @@ class Ring:
 
     @property
     def bend(self) -> float:
-        """The radius of the tube [mm]."""
+        """Radius of the tube [mm]."""
         return self.tube
 
     def moved(self, pose: Floats) -> Self:
-        """The surface moved by a ``pose`` (4, 4)."""
+        """Return the surface moved by ``pose`` (4, 4)."""
         return replace(self, pose=pose @ self.pose)
 
     def level(self, points: Floats) -> tuple[Floats, Floats]:
-        """The level (n,), the squared distance from the circle minus the squared radius of the tube, and its gradients (n, 3)."""
+        """Return the level (n,), the squared distance from the circle minus the tube's squared radius, and its gradients (n, 3)."""
         across = points - self._nearest(points)
         return np.vecdot(across, across) - self.tube**2, 2 * across
 
     def bending(self, points: Floats, directions: Floats) -> Floats:
-        """The second derivative (n,) of the level at ``points`` (n, 3) along ``directions`` (n, 3)."""
+        """Second derivative (n,) of the level at ``points`` (n, 3) along ``directions`` (n, 3)."""
         return self._bending(directions, *self._outward(points))
 
     def curving(self, points: Floats, directions: Floats) -> Floats:
-        """The second derivatives (n, 3) by length of geodesics through ``points`` along ``directions`` (n, 3)."""
+        """Second derivatives (n, 3) by arc length of the geodesics through ``points`` (n, 3) along ``directions`` (n, 3)."""
         outward, away = self._outward(points)
         slope = 2 * (points - self.pose[:3, 3] - self.radius * outward)
         bending = self._bending(directions, outward, away)
@@ -129,7 +131,7 @@ class Ring:
         return np.asarray(2 * (squares + around * (1 - self.radius / away)))
 
     def pushed(self, points: Floats) -> Floats:
-        """The ``points`` (n, 3), with points inside moved to the surface, away from the circle."""
+        """Move those ``points`` (n, 3) that are inside to the surface, away from the central circle of the tube."""
         middle = self._nearest(points)
         across = points - middle
         across[np.linalg.norm(across, axis=1) < _MIDDLE * self.tube] = _MIDDLE * self.tube * self.pose[:3, 2]
@@ -137,7 +139,7 @@ class Ring:
         return np.asarray(middle + across * np.maximum(self.tube / size, 1.0))
 
     def through(self, starts: Floats, ends: Floats) -> Floats:
-        """Points (n, 3) in the hole, nearest to where straight paths cross its plane; the midpoints of all other paths."""
+        """Points (n, 3) in the hole, nearest to where straight paths cross its plane; the midpoints of paths that do not cross."""
         axis, centre = self.pose[:3, 2], self.pose[:3, 3]
         low, high = (starts - centre) @ axis, (ends - centre) @ axis
         crosses = low * high < 0
@@ -148,7 +150,7 @@ class Ring:
         return np.where(crosses[:, None], inner, point)
 
     def _outward(self, points: Floats) -> tuple[Floats, Floats]:
-        """Unit vectors (n, 3) and distances (n,) from the axis; for a point on the axis, the first axis of the pose."""
+        """Return unit vectors (n, 3) and distances (n,) from the axis; for a point on the axis, the first axis of the pose."""
         arm = points - self.pose[:3, 3]
         flat = arm - (arm @ self.pose[:3, 2])[:, None] * self.pose[:3, 2]
         away = np.sqrt(np.vecdot(flat, flat))
@@ -157,9 +159,9 @@ class Ring:
         return flat / away[:, None], away
 
     def _nearest(self, points: Floats) -> Floats:
-        """The points (n, 3) of the circle nearest to ``points`` (n, 3)."""
+        """Points (n, 3) of the circle nearest to ``points`` (n, 3)."""
         return np.asarray(self.pose[:3, 3] + self.radius * self._outward(points)[0])
 
 
-# A smooth surface: its level is 0 on it and negative inside.
+# A smooth surface, whose level is 0 on the surface and negative inside.
 SmoothSurface = Quadric | Ring

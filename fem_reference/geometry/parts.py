@@ -12,15 +12,15 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.edges import Edges
 
 _ROUNDS = 4  # The number of rounds of collapses, flips and slides.
-_SHORT = 0.4  # Edges at a rim that are shorter than this fraction of a triangle's size are collapsed.
-_STRAIGHT = np.cos(np.radians(50))  # A rim that turns by more than 50 degrees at a point has a corner there.
+_SHORT = 0.4  # Edges at a rim that are shorter than this, relative to the triangle size, are collapsed.
+_STRAIGHT = np.cos(np.radians(50))  # A rim has a corner where its direction changes by more than 50 degrees.
 _SAME_SIDE = 0.5  # The minimum cosine between the normals of a triangle before and after a collapse.
 _TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Triangles in parts: ``labels`` (m,) are 0 if free, i + 1 in attachment i; ``rim`` (n,) masks the points where parts meet."""
+    """A surface in parts. ``labels`` (m,): 0 if free, i + 1 in attachment i; ``rim`` (n,): mask of the points where parts meet."""
 
     points: Floats
     triangles: Ints
@@ -29,16 +29,16 @@ class Parts:
 
     @property
     def surface(self) -> Surface:
-        """The surface of all parts together."""
+        """The surface that consists of all parts."""
         return Surface(self.points, self.triangles)
 
     def area(self, label: int) -> float:
-        """The area [mm2] of the triangles with this label."""
+        """Area [mm2] of the triangles with this ``label``."""
         return float(triangle_areas(self.points, self.triangles[self.labels == label]).sum())
 
 
 def between(triangles: Ints, labels: Ints, count: int) -> Bools:
-    """Mask (n,) of the ``count`` points of a surface at which ``triangles`` (m, 3) of different ``labels`` (m,) meet."""
+    """Mask (count,) of the points of a surface at which ``triangles`` (m, 3) with different ``labels`` (m,) meet."""
     low, high = np.full(count, np.iinfo(np.int64).max), np.full(count, -1)
     np.minimum.at(low, triangles.ravel(), np.repeat(labels, 3))
     np.maximum.at(high, triangles.ravel(), np.repeat(labels, 3))
@@ -46,7 +46,7 @@ def between(triangles: Ints, labels: Ints, count: int) -> Bools:
 
 
 def relaxed(parts: Parts, fine: Surface, size: float) -> Parts:
-    """The parts remeshed with well-shaped triangles of about ``size`` [mm] on the ``fine`` surface; rim points stay on the rim."""
+    """Remesh the parts with well-shaped triangles of about ``size`` [mm] on the ``fine`` surface; rim points stay on the rim."""
     for _ in range(_ROUNDS):
         parts = collapsed(parts, _SHORT * size)
         triangles = flip_edges(parts.points, parts.triangles, parts.labels)
@@ -57,14 +57,14 @@ def relaxed(parts: Parts, fine: Surface, size: float) -> Parts:
 
 
 def _rim_edges(parts: Parts) -> Ints:
-    """The edges (e, 2) between triangles of different labels."""
+    """Edges (e, 2) between triangles with different labels."""
     edges = Edges.of(parts.surface)
     left, right = parts.labels[edges.beside].T
     return np.asarray(edges.ends[left != right])
 
 
 def _along_rims(parts: Parts) -> Floats:
-    """Points (n, 3), with rim points moved along the rim towards the middle between their neighbours; corners and ends stay."""
+    """Points (n, 3), with points on rims moved along the rim towards the midpoint of their neighbours; corners and ends stay."""
     edges = _rim_edges(parts)
     count = len(parts.points)
     both = np.concatenate([edges, edges[:, ::-1]])
@@ -83,7 +83,7 @@ def _along_rims(parts: Parts) -> Floats:
 
 
 def collapsed(parts: Parts, short: float) -> Parts:
-    """The parts after the collapse of edges below ``short`` [mm] that end on a rim, if surface and rims keep their shape."""
+    """Collapse edges shorter than ``short`` [mm] that end on a rim, where the surface and the rims keep their shape."""
     ends = np.unique(np.sort(parts.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     lengths = np.linalg.norm(parts.points[ends[:, 0]] - parts.points[ends[:, 1]], axis=1)
     next_on_rim: list[list[int]] = [[] for _ in parts.points]
@@ -109,7 +109,7 @@ def collapsed(parts: Parts, short: float) -> Parts:
 
 
 def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> bool:
-    """True if ``goes`` has two ``neighbours`` on a rim, one of which is ``stays``, and the rim hardly turns at ``goes``."""
+    """True if ``goes`` has exactly two ``neighbours`` on a rim, including ``stays``, and the rim is nearly straight at ``goes``."""
     if len(neighbours) != 2 or stays not in neighbours:
         return False
     before, after = points[goes] - points[neighbours[0]], points[neighbours[1]] - points[goes]
@@ -117,10 +117,10 @@ def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> b
 
 
 def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) -> bool:
-    """True if moving ``goes`` onto ``stays`` keeps the surface manifold, edges sharp, and triangles unflipped and not too flat."""
+    """True if ``goes`` can be moved onto ``stays``: the surface stays manifold, sharp edges stay, no triangle flips or flattens."""
     points, triangles = parts.points, parts.triangles
     here, there = set(triangles[around[goes]].ravel().tolist()), set(triangles[around[stays]].ravel().tolist())
-    if len(here & there) != 4 or len(here | there) < 6:  # the ends share two neighbours, on more than a tetrahedron
+    if len(here & there) != 4 or len(here | there) < 6:  # the ends share two neighbours; a tetrahedron is not collapsed
         return False
     old = triangles[around[goes]]
     shift = (points[stays] - points[goes])[None]
@@ -137,15 +137,16 @@ def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) 
 
 
 def _flatness(points: Floats, triangles: Ints) -> Floats:
-    """4 sqrt(3) area divided by the sum of the squared sides of each triangle, (m,): 1 if equilateral, 0 if degenerate."""
+    """Shape quality (m,) of triangles, 1 if equilateral, 0 if degenerate: 4 sqrt(3) area divided by the sum of squared sides."""
     squares = np.sum((points[triangles] - points[np.roll(triangles, 1, axis=1)]) ** 2, axis=(1, 2))
     return np.asarray(4 * np.sqrt(3) * triangle_areas(points, triangles) / np.maximum(squares, _TINY))
 
 
 def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Floats:
-    """The points (n, 3) [mm] moved so that the parts have given ``areas`` [mm2], from label 1 on, and enclose a ``volume`` [mm3].
-    Before the move both are too small, like a polygon inscribed in a circle. In each round the entire rim of a part moves outwards
-    by the same distance, at most ``most`` [mm], and then all points move along their normals.
+    """Points (n, 3) [mm], moved so that the parts have the ``areas`` [mm2], from label 1 on, and the surface encloses ``volume``.
+
+    Before the move, areas and volume are too small, like those of a polygon inscribed in a circle. In each round the rim of each
+    part moves outwards by a uniform distance of at most ``most`` [mm], and then all points move along their normals.
     """
     for _ in range(_ROUNDS):
         points = np.array(parts.points)
@@ -158,7 +159,7 @@ def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Flo
 
 
 def _outwards(parts: Parts, label: int) -> tuple[Floats, float]:
-    """Unit vectors (n, 3) out of the part with this label and tangential to it, 0 off its rim; and the length of the rim [mm]."""
+    """Return unit vectors (n, 3) out of the part with this ``label``, tangential to it, 0 off its rim; and the rim's length."""
     triangles = parts.triangles[parts.labels == label]
     ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     corners = parts.points[triangles]

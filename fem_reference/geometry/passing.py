@@ -1,4 +1,4 @@
-"""Points that pass through moving triangles from their front to their back."""
+"""Detection of points that pass through moving triangles from the front to the back."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from fem_reference.foundations.mesh import Floats, normals
 
 _SHARES = np.arange(4) / 3
-# Maps from the values of a cubic at these fractions to its coefficients, and to its Bernstein coefficients, which bound it.
+# Matrices that map the values of a cubic at these fractions to its coefficients, and to its Bernstein coefficients, which bound it.
 _CUBIC = np.linalg.inv(np.vander(_SHARES, 4))
 _BERNSTEIN = np.linalg.inv(
     np.stack([(1, 3, 3, 1)[i] * _SHARES**i * (1 - _SHARES) ** (3 - i) for i in range(4)], axis=1)
@@ -14,11 +14,11 @@ _BERNSTEIN = np.linalg.inv(
 
 
 def passed(starts: Floats, ends: Floats, before: Floats, after: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) of points that pass through the triangle in the same row from its front to its back. The points move straight from
-    ``starts`` to ``ends`` (n, 3), and the corners of the triangles from ``before`` to ``after`` (n, 3, 3).
+    """Mask (n,) of the points that pass through the triangle in the same row from its front to its back. The points move straight
+    from ``starts`` to ``ends`` (n, 3), and the corners of the triangles from ``before`` to ``after`` (n, 3, 3).
 
-    The volume of the tetrahedron between point and triangle is a cubic function of the fraction of the path (Provot 1997, Collision
-    and self-collision handling in cloth model dedicated to design garments); where it is 0, the point is in the plane.
+    The volume of the tetrahedron formed by point and triangle is a cubic function of the fraction of the path, and is 0 where the
+    point is in the plane (Provot 1997, Collision and self-collision handling in cloth model dedicated to design garments).
     """
 
     def at(share: float, some: NDArray[np.int64] | slice) -> tuple[Floats, Floats]:
@@ -35,20 +35,20 @@ def passed(starts: Floats, ends: Floats, before: Floats, after: Floats) -> NDArr
 
 
 def _volume(points: Floats, triangles: Floats) -> Floats:
-    """Six times the volumes (n,) of the tetrahedra between points (n, 3) and triangles (n, 3, 3), positive in front of these."""
+    """Six times the volume (n,) of the tetrahedra formed by points (n, 3) and triangles (n, 3, 3); positive for points in front."""
     return np.asarray(np.einsum("ni,ni->n", points - triangles[:, 0], normals(triangles)))
 
 
 def _is_inside(point: Floats, triangle: Floats) -> bool:
-    """True if a ``point`` (1, 3) in the plane of a ``triangle`` (1, 3, 3) is in the triangle."""
+    """True if a ``point`` (1, 3) in the plane of a ``triangle`` (1, 3, 3) is inside the triangle."""
     across = normals(triangle)[0]
     arms = triangle[0] - point
     return bool((np.cross(arms, np.roll(arms, -1, axis=0)) @ across >= 0).all())
 
 
 def seen_along(points: Floats, directions: Floats, triangles: Floats) -> Floats:
-    """The distance (n,) [mm] from ``points`` (n, 3) along unit vectors ``directions`` (n, 3) to the first of the ``triangles``
-    (t, 3, 3) whose back faces the point, infinite if there is none (Moeller and Trumbore 1997).
+    """Distance (n,) [mm] from ``points`` (n, 3), along unit vectors ``directions`` (n, 3), to the first of ``triangles`` (t, 3, 3)
+    whose back faces the point; infinite if there is none (Moeller and Trumbore 1997).
     """
     first, one, other = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     out, found = np.cross(one, other), np.full(len(points), np.inf)

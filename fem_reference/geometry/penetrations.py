@@ -1,4 +1,4 @@
-"""Penetration of a closed body and a bone: its depth, and the overlap volume by random sampling."""
+"""Penetration of a closed body and a bone: the depth, and the volume of the overlap by random sampling."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,21 +18,21 @@ from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.skins import edge_lengths, quartered
 
 _NORMALS = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-_RINGS = 4  # rings of triangles that are searched one by one; the rest is searched at once, by connected parts
-# The number of points whose winding numbers take as long as building a search tree.
+_RINGS = 4  # rings of triangles that are searched one by one; then the rest is searched at once, by connected parts
+# For up to this many points, computing winding numbers takes less time than building a search tree.
 _FEW = 20
-# A factor on distances that covers their rounding.
+# A factor on distances that covers their rounding errors.
 _MORE = 1 + 1e-9
-# Sample points of a triangle that crosses another surface: a grid that divides its edges into quarters, with its corners.
+# Sample points of a triangle that crosses another surface, in barycentric coordinates: a grid that divides each edge into quarters.
 _GRID = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
 _CORNERS = _GRID.argmax(axis=0)
-# The first cubes have edges of at most this length [mm], and at most the longest extent of the surface divided by this number.
+# The maximum edge of the first cubes [mm], and the minimum number of first cubes along the longest extent of the surface.
 _FIRST_EDGE, _FIRST_CUBES = 10.0, 20
-# The volume is not computed if the box around the surface has more first cubes than this (a cubic metre or more).
+# The volume is not computed if the box around the surface has a volume of more than this many first cubes (a cubic metre or more).
 _TOO_MANY = 1e6
-# The number of rounds of subdivision, the maximum number of cubes after each, and of points drawn in them.
+# The maximum number of subdivisions, and the maximum number of cubes after each of them and of points drawn in the last cubes.
 _ROUNDS, _MOST = 3, 8000
-# The maximum number of times that a triangle is cut into four for sampling: its parts then have edges an eighth as long.
+# The maximum number of times that a triangle is cut into four for sampling; the edges are then an eighth as long.
 _PARTINGS = 3
 
 Distance = Callable[[Floats], Floats]
@@ -40,9 +40,9 @@ Distance = Callable[[Floats], Floats]
 
 @dataclass(frozen=True, eq=False)
 class Depths:
-    """Penetration depths (k,) [mm] of some vertices and triangles of a body and then of a bone, and their ``places`` (k, 3) [mm];
-    ``at`` (k,) are their indices, in ascending order. All other vertices and triangles are outside. Only triangles that cross the
-    other surface are sampled, and the deepest sample of each counts.
+    """Penetration depths of the vertices and triangles of a body and then of a bone. ``at`` (k,): their indices, in ascending
+    order; ``values`` (k,) [mm]: the depths; ``places`` (k, 3) [mm]: the points with these depths. Only triangles that cross the
+    other surface are sampled, and the deepest sample of each counts. All vertices and triangles that are not listed are outside.
     """
 
     at: Ints
@@ -50,7 +50,7 @@ class Depths:
     places: Floats
 
     def deepest(self, rest: "Depths | None" = None) -> tuple[float, Floats]:
-        """The maximum depth [mm] in excess of the depth at ``rest``, and its place (3,) [mm]."""
+        """Return the maximum depth [mm] in excess of the depth at ``rest``, and the point (3,) [mm] at which it occurs."""
         beyond = self.values.copy()
         if rest is not None:
             _, here, there = np.intersect1d(self.at, rest.at, assume_unique=True, return_indices=True)
@@ -60,11 +60,11 @@ class Depths:
 
 
 def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depths:
-    """Penetration of a ``body`` and a ``bone`` at a ``pose`` (4, 4); ``shape`` gives the distance to the bone.
+    """Compute the penetration of a ``body`` and a ``bone`` at a ``pose`` (4, 4); ``shape`` gives the distance to the bone.
 
     The depth in the bone is as accurate as its distance field; the depth in the body is exact.
     """
-    # In the bone's coordinates its bounding boxes stay the same; if the bone is at rest, the boxes of the body do too.
+    # In the bone's coordinates the bounding boxes of the bone stay the same; if the bone is at rest, those of the body do too.
     still = np.array_equal(pose, np.eye(4))
     local = body if still else body.moved_to(apply(np.linalg.inv(pose), body.points))
     pairs = crossings(local, bone)
@@ -85,7 +85,7 @@ def depths(body: Surface, bone: Surface, shape: Obstacle, pose: Floats) -> Depth
 
 
 def depths_within(body: Surface, points: Floats, known: Ints) -> Floats:
-    """Depths (n,) [mm] of ``points`` (n, 3) in a closed ``body``, 0 outside; fast for points near the ``known`` triangles.
+    """Depth (n,) [mm] of ``points`` (n, 3) in a closed ``body``, 0 outside; fast for points near the triangles ``known``.
 
     The sign is that of the angle-weighted normal at the closest point (Baerentzen and Aanaes 2005, doi 10.1109/TVCG.2005.49).
     """
@@ -104,7 +104,7 @@ def depths_within(body: Surface, points: Floats, known: Ints) -> Floats:
 
 
 def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
-    """Mask (n,) of the ``points`` (n, 3) inside a closed ``body``, by winding number; for few points no search tree is built."""
+    """Mask (n,) of the ``points`` (n, 3) inside a closed ``body``, by winding numbers; for few points no search tree is built."""
     found, some = np.zeros(len(points), bool), _in_box(body, points)
     if len(some) > _FEW:
         found[some] = inside(body, points[some])
@@ -114,7 +114,7 @@ def _inside(body: Surface, points: Floats) -> NDArray[np.bool_]:
 
 
 def _in_box(body: Surface, points: Floats) -> Ints:
-    """The indices (k,) of the ``points`` (n, 3) within the bounding box of a ``body``."""
+    """Indices (k,) of the ``points`` (n, 3) within the bounding box of a ``body``."""
     low, high = bounds(body) if len(points) else (points, points)
     return np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
 
@@ -122,9 +122,11 @@ def _in_box(body: Surface, points: Floats) -> Ints:
 def _of_surface(
     surface: Surface, crossing: Ints, depth: Callable[[Floats], Floats], tips: Ints, within: NDArray[np.bool_]
 ) -> tuple[Ints, Floats, Floats]:
-    """Indices of vertices and then of triangles of a surface, with their ``depth`` and places. Each triangle ``crossing`` another
-    surface has its deepest sample. The vertices are those connected to inside corners of these triangles, or to the ``tips`` that
-    are ``within`` the other surface; ``tips`` belong to parts without such triangles.
+    """Return the indices of vertices and then of triangles of a surface, their depths, and the points with these depths.
+
+    The triangles are those ``crossing`` another surface, each with its deepest sample. The vertices are the ``tips``, which belong
+    to parts without such triangles, and all vertices connected to a corner inside the other surface or to one of the tips
+    ``within`` it. ``depth`` is a function of points.
     """
     points, corners = surface.points, surface.triangles[crossing]
     grid = np.einsum("gc,tci->tgi", _GRID, points[corners])
@@ -146,7 +148,7 @@ def _of_surface(
 
 
 def _flood(deep: NDArray[np.bool_], triangles: Ints, crossing: Ints) -> None:
-    """Extend the mask ``deep`` (n,) of vertices across all connected ``triangles`` that are not ``crossing``."""
+    """Extend the mask ``deep`` (n,) of vertices to all vertices connected with them by ``triangles`` that are not ``crossing``."""
     if not deep.any():
         return
     goes_on = np.ones(len(triangles), bool)
@@ -162,7 +164,7 @@ def _flood(deep: NDArray[np.bool_], triangles: Ints, crossing: Ints) -> None:
 
 
 def _tips(surface: Surface, crossing: Ints) -> Ints:
-    """A vertex of each connected part of a surface that has no triangles ``crossing`` another surface and so is on one side."""
+    """First vertex of each connected part that has no triangles ``crossing`` another surface and so lies on one side of it."""
     firsts, own = parts_of(surface)
     crossed = np.zeros(len(own), bool)
     crossed[own[surface.triangles[crossing, 0]]] = True
@@ -170,23 +172,23 @@ def _tips(surface: Surface, crossing: Ints) -> Ints:
 
 
 class Shared(NamedTuple):
-    """The ``volume`` [mm3] within the rigid body, and the depth [mm] of the ``deepest`` sample there, 0 if there is none."""
+    """The ``volume`` [mm3] within a rigid body, and the depth [mm] of the ``deepest`` sample in it, 0 if there is none."""
 
     volume: float
     deepest: float
 
 
 def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance, body: Floats) -> Shared:
-    """The part of the inside of a closed ``surface`` of m triangles that is in a rigid body.
+    """Estimate the part of the inside of a closed ``surface`` with m triangles that lies in a rigid body.
 
-    Space is cut into cubes, and cubes that may contain a part of the overlap are cut into smaller cubes. In these, 4000 to 8000
-    random points are drawn, the same every time. The estimate is unbiased. Its standard deviation is at most half the volume of
-    a point, times the square root of the number of points in cubes on the border of the overlap.
+    Space is cut into cubes, and cubes that may contain a part of the overlap are cut into smaller ones. In these, 4000 to 8000
+    random points are drawn, the same every time. The estimate is unbiased; its standard deviation is at most half the volume that a
+    point represents, times the square root of the number of points in cubes on the border of the overlap.
 
-    A point counts if its nearest triangle is in the mask ``counts`` (m,). The rigid body is given by the ``distance`` (n,) [mm] of
-    points (n, 3) to it, negative inside; ``gaps`` are the distances of the surface's points. If all points ``body`` (k, 3) [mm],
-    on all sides of the rigid body, are inside the surface, the entire body counts. The volume is 0 if no counted triangle enters
-    the body and the middle of the body is outside the surface. It is NaN if the surface has grown beyond a cubic metre.
+    A point counts if its nearest triangle is in the mask ``counts`` (m,). ``distance`` returns the distance (n,) [mm] of points
+    (n, 3) to the rigid body, negative inside; ``gaps`` are the distances of the surface's points. If all points ``body``
+    (k, 3) [mm], on all sides of the rigid body, are inside the surface, the entire body counts. The volume is 0 if no counted
+    triangle enters the body and the body's centre is outside the surface. It is NaN if the surface has grown beyond a cubic metre.
     """
     extent = np.ptp(surface.points, axis=0)
     within = _within(surface, body)
@@ -212,14 +214,14 @@ def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: 
 
 
 def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
-    """Mask (k,) of the points (k, 3) of a ``body`` inside the surface; all False if their mean is outside the surface's box."""
+    """Mask (k,) of the points ``body`` (k, 3) inside the surface; all False if their mean is outside the surface's bounding box."""
     middle, low, high = body.sum(axis=0) / max(1, len(body)), surface.points.min(axis=0), surface.points.max(axis=0)
     boxed = len(body) > 0 and bool(((middle > low) & (middle < high)).all())
     return _inside(surface, body) if boxed else np.zeros(len(body), bool)
 
 
 def _touches(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: Distance) -> bool:
-    """True if a counted triangle enters the body; tested at vertices and, near the body, at corners of parts of triangles."""
+    """True if a counted triangle enters the body, tested at vertices and, near the body, at the corners of pieces of triangles."""
     triangles = surface.triangles[counts]
     corners, away = surface.points[triangles], gaps[triangles]
     for _ in range(_PARTINGS):
@@ -231,7 +233,7 @@ def _touches(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance
 
 
 class _Sides:
-    """The counted triangles and the other triangles of a surface, for distance queries."""
+    """The counted and the other triangles of a surface, for distance queries."""
 
     def __init__(self, surface: Surface, counts: NDArray[np.bool_]) -> None:
         self.surface = surface
@@ -253,7 +255,7 @@ class _Sides:
         return found
 
     def _distances(self, points: Floats) -> list[Floats]:
-        """Distance (n,) [mm] of ``points`` (n, 3) to the counted triangles, and to the others; infinite where there are none."""
+        """Distances (n,) [mm] of ``points`` (n, 3) to the counted triangles and to the others; infinite if there are none."""
         return [
             distances(points, part).distance if len(part.triangles) else np.full(len(points), np.inf)
             for part in self.parts
@@ -261,7 +263,7 @@ class _Sides:
 
 
 def _first_cubes(points: Floats) -> tuple[Floats, float]:
-    """Centres (n, 3) of cubes that fill the box around ``points``, and their edge [mm]."""
+    """Return the centres (n, 3) of cubes that fill the bounding box of ``points``, and their edge [mm]."""
     low, extent = points.min(axis=0), np.ptp(points, axis=0)
     edge = min(_FIRST_EDGE, float(extent.max()) / _FIRST_CUBES)
     numbers = tuple(int(count) for count in np.maximum(1, np.ceil(extent / edge)))
@@ -269,11 +271,11 @@ def _first_cubes(points: Floats) -> tuple[Floats, float]:
 
 
 def _cut(centres: Floats, edge: float, parts: int) -> tuple[Floats, float]:
-    """Every cube cut into ``parts`` along each axis: centres (n, 3) and edge [mm]."""
+    """Cut each cube into ``parts`` along each axis; returns the centres (n, 3) and the edge [mm]."""
     steps = (np.moveaxis(np.indices((parts,) * 3), 0, -1).reshape(-1, 3) + 0.5) / parts - 0.5
     return (centres[:, None] + edge * steps).reshape(-1, 3), edge / parts
 
 
 def _reach(edge: float) -> float:
-    """The distance [mm] from the centre of a cube to its corners."""
+    """Distance [mm] from the centre of a cube to its corners."""
     return float(np.sqrt(3) / 2 * edge)

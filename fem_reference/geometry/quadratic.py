@@ -9,7 +9,7 @@ from skfem.quadrature import get_quadrature
 
 from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, TetMesh, corner_areas, tet_volumes
 
-# The pairs of corners of a tet between which its last six nodes lie.
+# The pairs of corners of a tet at whose midpoints its last six nodes lie.
 EDGES = np.array([[0, 1], [0, 2], [1, 2], [0, 3], [1, 3], [2, 3]])
 _MIDDLE = np.zeros((4, 4), np.int64)
 _MIDDLE[EDGES[:, 0], EDGES[:, 1]] = _MIDDLE[EDGES[:, 1], EDGES[:, 0]] = np.arange(4, 10)
@@ -20,9 +20,9 @@ _FLAT = np.repeat([0, 1 / 3], 3)
 
 @dataclass(frozen=True, eq=False)
 class Displaced:
-    """A ``mesh``, straight at rest, whose nodes are displaced ``by`` (k, 10, 3) [mm] and have a ``velocity`` (k, 10, 3) [mm/s],
-    None if unknown. The nodes of a tet are its corners, then the midpoints of its ``EDGES``. This class is a
-    :class:`fem_reference.foundations.loads.Shape`.
+    """A ``mesh``, straight at rest, with the displacements ``by`` (k, 10, 3) [mm] and the ``velocity`` (k, 10, 3) [mm/s] of the
+    nodes of its tets, None if unknown. The nodes of a tet are its corners and then the midpoints of its ``EDGES``. The class
+    implements :class:`fem_reference.foundations.loads.Shape`.
     """
 
     mesh: TetMesh
@@ -31,13 +31,15 @@ class Displaced:
 
     @cached_property
     def nodes(self) -> Floats:
-        """The present positions (k, 10, 3) [mm] of the nodes; NaN if they are unknown."""
+        """Current positions (k, 10, 3) [mm] of the nodes; NaN if they are unknown."""
         corners = self.mesh.points[self.mesh.tets]
         middles = corners[:, EDGES].mean(axis=2)
         return np.asarray(np.concatenate([corners, middles], axis=1) + (np.nan if self.by is None else self.by))
 
     def measure(self, on: str | None = None) -> tuple[float, Floats]:
-        """The volume [mm3] at rest, or the area [mm2] of a region, and the integral (3,) of the present positions over it."""
+        """Return the rest volume [mm3], or the rest area [mm2] of a region ``on``, and the integral (3,) of the current positions
+        over that volume or area.
+        """
         if on is None:
             sizes = tet_volumes(self.mesh.points, self.mesh.tets)
             means = np.einsum("q,kqi->ki", _BULK, self.nodes)
@@ -48,7 +50,7 @@ class Displaced:
         return float(sizes.sum()), np.asarray(sizes @ means)
 
     def facing(self, on: str) -> tuple[Floats, Floats] | None:
-        """The present outward vector area (3,) [mm2] of a region, and its moment (3,) [mm3] about the origin; None if unknown."""
+        """Current vector area (3,) [mm2] of a region, outward, and its moment (3,) [mm3] about the origin; None if unknown."""
         if self.by is None:
             return None
         tets, local = self._facets(on)
@@ -59,17 +61,17 @@ class Displaced:
         return areas.sum(axis=(0, 1)), np.cross(places, areas).sum(axis=(0, 1))
 
     def motion(self) -> tuple[Floats, Floats] | None:
-        """The integral of the velocity (3,) [mm4/s] over the volume at rest, and its moment (3,) [mm5/s]; None if unknown."""
+        """Return the integral (3,) [mm4/s] of the velocity over the rest volume and its moment (3,) [mm5/s]; None if unknown."""
         if self.by is None or self.velocity is None:
             return None
         sizes = tet_volumes(self.mesh.points, self.mesh.tets)
         values, _, weights = _rule(skfem.ElementTetP2())
-        products = 6 * (weights * values.T) @ values  # means over a tet of the products of its basis functions
+        products = 6 * (weights * values.T) @ values  # mean of each product of two basis functions over a tet
         moments = np.cross(products @ self.nodes, self.velocity).sum(axis=1)
         return sizes @ np.einsum("q,kqi->ki", _BULK, self.velocity), sizes @ moments
 
     def _facets(self, on: str) -> tuple[Ints, Ints]:
-        """The tet (m,) of each facet of a region, and the facet's nodes (m, 6) in this tet: outward corners, then midpoints."""
+        """Return the tet (m,) of each facet of a region, and the facet's nodes (m, 6) in it: outward corners, then midpoints."""
         size = len(self.mesh.points)
         found, wanted = (
             (ends[:, 0] * size + ends[:, 1]) * size + ends[:, 2]
@@ -89,5 +91,5 @@ def _rule(element: skfem.ElementTriP2 | skfem.ElementTetP2) -> tuple[Floats, Flo
 
 
 def quadratic(nodal: Floats) -> Floats:
-    """Values (k, 10, c) at the ten nodes of tets, from ``nodal`` values (k, 10, c) or, if linear, corner values (k, 4, c)."""
+    """Values (k, 10, c) at the ten nodes of tets, from ``nodal``: these values or, if linear, the values (k, 4, c) at corners."""
     return nodal if nodal.shape[1] == 10 else np.concatenate([nodal, nodal[:, EDGES].mean(axis=2)], axis=1)

@@ -14,8 +14,8 @@ from fem_reference.foundations.mesh import Floats
 class RadialSum:
     """``sum_i weights_i exp(-(shape |x - centres_i|)^2)`` plus an optional polynomial of degree 0 or 1 (3.6, 3.7, 3.10).
 
-    ``centres`` (m, d), ``weights`` (m,), ``polynomial`` (0,), (1,) or (d + 1,); ``shape``: an inverse length; ``condition``: the
-    condition number of the matrix that gave the weights.
+    ``centres`` (m, d), ``weights`` (m,); ``polynomial``: the coefficients (0,), (1,) or (d + 1,); ``shape``: an inverse length;
+    ``condition``: the condition number of the matrix from which the weights were computed.
     """
 
     centres: Floats
@@ -25,14 +25,14 @@ class RadialSum:
     condition: float
 
     def __call__(self, points: Floats) -> Floats:
-        """Values (n,) at ``points`` (n, d)."""
+        """Evaluate the sum at ``points`` (n, d); returns (n,)."""
         found = _gaussians(points, self.centres, self.shape) @ self.weights
         return np.asarray(found + _monomials(points, len(self.polynomial)) @ self.polynomial)
 
 
 def radial_sum(points: Floats, values: Floats, centres: Floats, shape: float, *, terms: int = 0) -> RadialSum:
-    """The least-squares fit with these ``centres`` (m, d) to ``values`` (n,) at ``points`` (n, d); with as many centres as points
-    the fit interpolates. The polynomial has 0, 1 or d + 1 ``terms``; the weights are orthogonal to it (3.10).
+    """Fit a sum with the ``centres`` (m, d) to ``values`` (n,) at ``points`` (n, d) by least squares. With as many centres as
+    points, the sum interpolates the values. The polynomial has 0, 1 or d + 1 ``terms``; the weights are orthogonal to it (3.10).
     """
     if len(centres) > len(points) or len(centres) <= terms:
         raise InputError("centres", len(centres), f"more than {terms} and at most {len(points)}, the number of points")
@@ -46,17 +46,17 @@ def radial_sum(points: Floats, values: Floats, centres: Floats, shape: float, *,
 
 
 def _gaussians(points: Floats, centres: Floats, shape: float) -> Floats:
-    """The basis functions of ``centres`` (m, d) at ``points`` (n, d): (n, m)."""
+    """Basis functions (n, m) of the ``centres`` (m, d) at ``points`` (n, d)."""
     return np.asarray(np.exp(-((shape * cdist(points, centres)) ** 2)))
 
 
 def _monomials(points: Floats, terms: int) -> Floats:
-    """The first ``terms`` of 1, x, y, ... at ``points`` (n, d): (n, terms)."""
+    """First ``terms`` of the monomials 1, x, y, ... at ``points`` (n, d); returns (n, terms)."""
     return np.hstack([np.ones((len(points), 1)), points])[:, :terms]
 
 
 def grid_centres(points: Floats, count: int) -> Floats:
-    """At most ``count`` centres at the nodes of a regular grid over the box of ``points`` (n, d)."""
+    """Return at most ``count`` centres, at the nodes of a regular grid over the bounding box of ``points`` (n, d)."""
     low, high = points.min(axis=0), points.max(axis=0)
     each = int(count ** (1 / points.shape[1]) + 1e-9)
     axes = np.meshgrid(*[np.linspace(a, b, each) for a, b in zip(low, high, strict=True)], indexing="ij")
@@ -64,20 +64,20 @@ def grid_centres(points: Floats, count: int) -> Floats:
 
 
 def halton(count: int, dimensions: int) -> Floats:
-    """The first ``count`` points (count, d) of Halton's sequence, whose bases are the first primes, in the open unit cube (3.8)."""
-    from scipy.stats import qmc  # the import takes half a second
+    """First ``count`` points (count, d) of Halton's sequence, with the first primes as bases, in the open unit cube (3.8)."""
+    from scipy.stats import qmc  # imported here because the import takes half a second
 
     return np.asarray(qmc.Halton(dimensions, scramble=False).fast_forward(1).random(count))
 
 
 def halton_centres(points: Floats, count: int) -> Floats:
-    """``count`` centres by Halton's sequence in the box of ``points`` (n, d)."""
+    """Return ``count`` centres from Halton's sequence in the bounding box of ``points`` (n, d)."""
     low, high = points.min(axis=0), points.max(axis=0)
     return low + (high - low) * halton(count, points.shape[1])
 
 
 def greedy_centres(points: Floats, values: Floats, count: int, shape: float, *, terms: int = 0) -> Floats:
-    """``count`` of the ``points`` (n, d): each is where the sum with the previous centres deviates most from ``values`` (n,)."""
+    """Choose ``count`` of ``points`` (n, d), each where the sum with the previous centres deviates most from ``values`` (n,)."""
     chosen = list(np.argsort(-np.abs(values - values.mean()), kind="stable")[: terms + 1])
     while len(chosen) < count:
         off = np.abs(values - radial_sum(points, values, points[chosen], shape, terms=terms)(points))
@@ -87,8 +87,8 @@ def greedy_centres(points: Floats, values: Floats, count: int, shape: float, *, 
 
 
 def feature_centres(points: Floats, values: Floats, count: int, *, neighbours: int = 6) -> Floats:
-    """``count`` of the ``points`` (n, d): local maxima and minima of ``values`` (n,) among their neighbours first, then points
-    whose values differ most from the mean of their neighbours, as in the report (3.5.1).
+    """Choose ``count`` of the ``points`` (n, d): first the local maxima and minima of ``values`` (n,) among the nearest
+    ``neighbours``, then points whose values differ most from the mean of their neighbours' values, as in the report (3.5.1).
     """
     _, near = cKDTree(points).query(points, k=min(neighbours + 1, len(points)))
     around = values[near[:, 1:]]

@@ -10,32 +10,34 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.fibres import FibreField
 from fem_reference.geometry.signed_distance import signed_distances
 
-# Functions of points (n, 3) [mm] at rest that give shares (n,), from 0 to 1, or depths (n,) [mm] below a border. Picklable.
+# Functions that take rest points (n, 3) [mm] and return shares (n,), from 0 to 1, or depths (n,) [mm] inside a border. They can be
+# pickled.
 Region = Callable[[Floats], Floats]
 Depth = Callable[[Floats], Floats]
 # The slope of the share at the depth ``width``, divided by its slope at the border.
 _RISE = 1000.0
-# Points on the border of a cell are moved by this fraction of the way to its middle, so that they are in the regions of the cell.
+# Points on the border of a cell are moved by this fraction of the way to its centre, to be in the same regions as the cell.
 INWARDS = 1e-6
-# The approximate number of grid points in the bounding box of a body of any size.
+# The approximate number of grid points in the bounding box of a body.
 _SAMPLES = 20_000
 
 
 @dataclass(frozen=True, eq=False)
 class Blended:
-    """The region where the depth is above 0: its share is ``(1000^t - 1) / 999``, where t grows from 0 at the border to 1 at depth
-    ``width`` [mm].
+    """The region in which ``depth`` is positive. Its share is ``(1000^t - 1) / 999``, where t grows from 0 at the border to 1 at a
+    depth of ``width`` [mm]; with a width of 0 the share jumps to 1.
 
-    In a region a thousand times as stiff as the body, the stiffness grows by the same factor in equal parts of the width, so
-    elements that resolve the width converge. With ``3 t^2 - 2 t^3`` most of the growth would be in a fiftieth of the width. The
-    stiffer material should therefore be the region. In tension across the border, 0.14 of the width acts as soft material.
+    In a region that is a thousand times as stiff as the body, the stiffness then grows by the same factor in equal parts of the
+    width, so elements that resolve the width converge; with ``3 t^2 - 2 t^3`` most of the growth would be in a fiftieth of the
+    width. The region should therefore be the stiffer material. In tension across the border, 0.14 of the width acts as soft
+    material.
     """
 
     depth: Depth
     width: float
 
     def __call__(self, points: Floats) -> Floats:
-        """The shares (n,)."""
+        """Shares (n,) at ``points`` (n, 3)."""
         depth = self.depth(points)
         if self.width == 0:
             return np.where(depth >= 0, 1.0, 0.0)
@@ -45,42 +47,43 @@ class Blended:
 
 @dataclass(frozen=True, eq=False)
 class Union:
-    """The union of several ``regions`` of shares a, b, ...: ``1 - (1 - a) (1 - b) ...``."""
+    """Union of several ``regions`` with shares a, b, ...: ``1 - (1 - a) (1 - b) ...``."""
 
     regions: tuple[Region, ...]
 
     def __call__(self, points: Floats) -> Floats:
-        """The shares (n,)."""
+        """Shares (n,) at ``points`` (n, 3)."""
         return np.asarray(1 - np.prod([1 - region(points) for region in self.regions], axis=0))
 
 
 @dataclass(frozen=True, eq=False)
 class Inside:
-    """The depth inside a closed ``surface``."""
+    """Depth inside a closed ``surface``."""
 
     surface: Surface
 
     def __call__(self, points: Floats) -> Floats:
-        """The depths (n,) [mm]."""
+        """Depths (n,) [mm] of ``points`` (n, 3)."""
         return -signed_distances(points, self.surface)
 
 
 @dataclass(frozen=True, eq=False)
 class Around:
-    """The part of a body within a ``reach`` [mm] of a ``surface``, closed or not."""
+    """Depth inside the part of a body that is within ``reach`` [mm] of a ``surface``, closed or not."""
 
     surface: Surface
     reach: float
 
     def __call__(self, points: Floats) -> Floats:
-        """The depths (n,) [mm]."""
+        """Depths (n,) [mm] of ``points`` (n, 3)."""
         return self.reach - distances(points, self.surface).distance
 
 
 @dataclass(frozen=True, eq=False)
 class Between:
-    """The part of a body where a Laplace ``field`` between two attachments is between ``first`` and ``last``; the field is 0
-    and 1 on the attachments. The depth is the difference of the field from these values divided by its mean slope.
+    """Depth inside the part of a body in which a Laplace ``field``, 0 and 1 on two attachments, is between ``first`` and ``last``.
+    The depth is the difference between the field and the nearer of these values, divided by the mean slope of the field. A
+    ``first`` of 0 or a ``last`` of 1 is no border.
     """
 
     field: FibreField
@@ -88,7 +91,7 @@ class Between:
     last: float
 
     def __call__(self, points: Floats) -> Floats:
-        """The depths (n,) [mm]."""
+        """Depths (n,) [mm] of ``points`` (n, 3)."""
         mesh = self.field.mesh
         values = self.field.locator.embed(points).interpolate(mesh, self.field.values)
         slopes = np.linalg.norm(self.field.gradients[mesh.tets].mean(axis=1), axis=1)

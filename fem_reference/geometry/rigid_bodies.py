@@ -1,8 +1,8 @@
-"""Signed distance to bones of simple shapes, in closed form, and the protocol of the shapes of all bones.
+"""Signed distance to bones of simple shapes, in closed form, and the protocol that the shapes of all bones implement.
 
-Coordinates are those of the body in its rest pose. Distances are negative inside; gradients are unit vectors out of the body, along
-the normal at the nearest part of the surface; curvatures are the second derivatives. On ridges, where two parts are equally near,
-one of the two is used; an infinite curvature (on a sharp edge, at a centre, on an axis) is replaced by zero.
+Coordinates are those of the bone in its rest pose. Distances are negative inside. Gradients are unit vectors out of the bone, along
+the normal at the nearest point of the surface; curvatures are second derivatives. On ridges, where two parts of the surface are
+equally near, one of them is used. Infinite curvatures (on a sharp edge, at a centre or on an axis) are replaced by zero.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ Vector = tuple[float, float, float]
 
 
 class Sampled(NamedTuple):
-    """At n points: signed ``distance`` (n,) [mm], its ``gradient`` (n, 3), and its ``curvature`` (n, 3, 3) [1/mm]."""
+    """Signed ``distance`` (n,) [mm] of n points, its ``gradient`` (n, 3), and its ``curvature`` (n, 3, 3) [1/mm]."""
 
     distance: Floats
     gradient: Floats
@@ -27,43 +27,45 @@ class Sampled(NamedTuple):
 
 
 class Obstacle(Protocol):
-    """The shape of a bone: a signed distance that changes along a path by at most ``steepest`` times the path's length."""
+    """The shape of a bone: a signed distance, which changes along a path by at most ``steepest`` times the path's length."""
 
     @property
     def steepest(self) -> float:
-        """An upper bound on the length of the gradient."""
+        """An upper bound on the length of the gradient of the distance."""
 
     @property
     def half_thickness(self) -> float:
-        """The maximum depth [mm] inside the body."""
+        """The maximum depth [mm] of a point inside the bone."""
 
     def clearance(self, within: float) -> Callable[[Floats], Floats]:
-        """A lower bound (n,) [mm], for points (n, 3), on the length of a path to a point at most ``within`` [mm] from the body."""
+        """Return a function of points (n, 3) [mm]. It gives a lower bound (n,) [mm] on the length of any path from each point to
+        within ``within`` [mm] of the bone.
+        """
 
     def sample(self, points: Floats) -> Sampled:
-        """Distance and its two derivatives at ``points`` (n, 3) [mm], in the body's rest pose; NaN where a coordinate is NaN."""
+        """Distance and its two derivatives at ``points`` (n, 3) [mm], in the bone's rest pose; NaN where a coordinate is NaN."""
 
     def distances(self, points: Floats) -> Floats:
-        """The distance (n,) [mm] of :meth:`sample` alone."""
+        """The distance (n,) [mm] of :meth:`sample`, without the derivatives."""
 
 
 class Exact:
-    """Base of bodies whose distance has a closed form, exact everywhere."""
+    """Base class of bones whose signed distance has a closed form and is exact everywhere."""
 
     steepest: ClassVar[float] = 1.0
 
     def clearance(self: Obstacle, within: float) -> Callable[[Floats], Floats]:
-        """The distance of points minus ``within`` [mm]."""
+        """Return a function of points: their distance minus ``within`` [mm]."""
         return lambda points: self.sample(points).distance - within
 
     def distances(self: Obstacle, points: Floats) -> Floats:
-        """The distance (n,) [mm] of ``points`` (n, 3)."""
+        """Distance (n,) [mm] of ``points`` (n, 3)."""
         return self.sample(points).distance
 
 
 @dataclass(frozen=True)
 class HalfSpace(Exact):
-    """The half-space behind the plane through ``point`` [mm] with the outward ``normal``, of any length."""
+    """A half-space behind the plane through ``point`` [mm] with the outward ``normal``, which may have any length."""
 
     half_thickness: ClassVar[float] = np.inf
     point: Vector
@@ -74,7 +76,7 @@ class HalfSpace(Exact):
             raise InputError("half space: normal", self.normal, "a direction")
 
     def sample(self, points: Floats) -> Sampled:
-        """``(x - point) . normal``."""
+        """Distance ``(x - point) . normal`` and its derivatives."""
         normal = np.asarray(self.normal, float) / np.linalg.norm(self.normal)
         return Sampled((points - self.point) @ normal, np.tile(normal, (len(points), 1)), np.zeros((len(points), 3, 3)))
 
@@ -95,14 +97,14 @@ class Sphere(Exact):
         return self.radius
 
     def sample(self, points: Floats) -> Sampled:
-        """``|x - centre| - radius``."""
+        """Distance ``|x - centre| - radius`` and its derivatives."""
         length, away, squares = _length(points - self.centre)
         return Sampled(length - self.radius, away, _over(np.eye(3) - squares, length))
 
 
 @dataclass(frozen=True)
 class _Rod(Exact):
-    """A body about the segment from ``start`` to ``end`` [mm], of a ``radius`` [mm]."""
+    """A shape of ``radius`` [mm] about the segment from ``start`` to ``end`` [mm]."""
 
     start: Vector
     end: Vector
@@ -117,7 +119,7 @@ class _Rod(Exact):
 
 @dataclass(frozen=True)
 class Capsule(_Rod):
-    """The points within ``radius`` of the segment from ``start`` to ``end`` [mm]."""
+    """A capsule: all points within ``radius`` of the segment from ``start`` to ``end`` [mm]."""
 
     @property
     def half_thickness(self) -> float:
@@ -125,7 +127,7 @@ class Capsule(_Rod):
         return self.radius
 
     def sample(self, points: Floats) -> Sampled:
-        """The distance to the segment, minus the radius."""
+        """Distance to the segment minus the radius, and its derivatives."""
         axis, extent = _axis(self.start, self.end)
         along = (points - self.start) @ axis
         length, away, squares = _length(points - self.start - np.clip(along, 0, extent)[:, None] * axis)
@@ -136,7 +138,7 @@ class Capsule(_Rod):
 
 @dataclass(frozen=True)
 class Box(Exact):
-    """A box about ``centre`` of outer ``size`` [mm] along the axes, with edges and corners rounded to radius ``rounding`` [mm]."""
+    """A box about ``centre`` of outer ``size`` [mm] along the axes, with edges and corners of the radius ``rounding`` [mm]."""
 
     centre: Vector
     size: Vector
@@ -154,7 +156,7 @@ class Box(Exact):
         return min(self.size) / 2
 
     def sample(self, points: Floats) -> Sampled:
-        """The distance to a box that is smaller by the rounding on each side, minus the rounding."""
+        """Distance to a box that is smaller by the rounding on each side, minus the rounding, and its derivatives."""
         away = points - self.centre
         sign = np.where(away < 0, -1.0, 1.0)
         beyond = np.abs(away) - (np.asarray(self.size) / 2 - self.rounding)
@@ -169,11 +171,11 @@ class Cylinder(_Rod):
 
     @property
     def half_thickness(self) -> float:
-        """The radius or half the length, whichever is less [mm]."""
+        """The smaller of the radius and half the length [mm]."""
         return float(min(self.radius, np.linalg.norm(np.subtract(self.end, self.start)) / 2))
 
     def sample(self, points: Floats) -> Sampled:
-        """The distance to a rectangle in the half-plane whose coordinates are the distances from the axis and from the middle."""
+        """Distance, with derivatives, to a rectangle in a half-plane whose coordinates are the distances from axis and centre."""
         axis, extent = _axis(self.start, self.end)
         away = points - (np.asarray(self.start, float) + self.end) / 2
         along = away @ axis
@@ -187,7 +189,7 @@ class Cylinder(_Rod):
         return Sampled(distance, np.einsum("na,nai->ni", slope, frame), curvature)
 
 
-# The bodies by their names in case files.
+# The shapes, by their names in case files.
 CLOSED_FORMS: dict[str, type[HalfSpace | Box | Sphere | Capsule | Cylinder]] = {
     "half_space": HalfSpace,
     "box": Box,
@@ -198,7 +200,7 @@ CLOSED_FORMS: dict[str, type[HalfSpace | Box | Sphere | Capsule | Cylinder]] = {
 
 
 def _orthant(beyond: Floats) -> Sampled:
-    """Distance of points ``beyond`` (n, d) to the orthant of negative coordinates; its derivatives (n, d) and (n, d, d)."""
+    """Distance of points ``beyond`` (n, d) to the orthant of negative coordinates, and its derivatives (n, d) and (n, d, d)."""
     outside = beyond > 0
     length, away, squares = _length(np.where(outside, beyond, 0.0))
     nearest = np.arange(beyond.shape[1]) == beyond.argmax(axis=1)[:, None]
@@ -209,7 +211,7 @@ def _orthant(beyond: Floats) -> Sampled:
 
 
 def _length(vectors: Floats) -> tuple[Floats, Floats, Floats]:
-    """Lengths (n,) of ``vectors`` (n, d), unit vectors (n, d) along them (an axis for zero), and their outer products (n, d, d)."""
+    """Return the lengths (n,) of ``vectors`` (n, d), their unit vectors (n, d) (an axis for zero), and outer products (n, d, d)."""
     length = np.linalg.norm(vectors, axis=1)
     some = np.eye(vectors.shape[1])[-1]
     unit = np.where((length == 0)[:, None], some, vectors / np.where(length == 0, 1, length)[:, None])
@@ -217,12 +219,12 @@ def _length(vectors: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _over(tensors: Floats, length: Floats) -> Floats:
-    """``tensors`` (n, d, d) divided by ``length`` (n,), zero if the length is zero."""
+    """Divide ``tensors`` (n, d, d) by ``length`` (n,); zero where the length is zero."""
     return np.asarray(tensors * np.divide(1, length, out=np.zeros_like(length), where=length != 0)[:, None, None])
 
 
 def _axis(start: Vector, end: Vector) -> tuple[NDArray[np.float64], float]:
-    """The unit vector from ``start`` to ``end`` and the distance between them."""
+    """Return the unit vector from ``start`` to ``end`` and the distance between them."""
     direction = np.subtract(end, start, dtype=float)
     extent = float(np.linalg.norm(direction))
     return direction / extent, extent

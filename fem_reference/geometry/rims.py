@@ -1,4 +1,4 @@
-"""Rims of attachments as edges of a coarse surface: triangles end at the rim."""
+"""Rims of attachments as edges of a coarse surface, so that no triangle extends across a rim."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -22,29 +22,31 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.parts import Parts, between, relaxed, widened
 from fem_reference.geometry.sectors import attached_area, sectors, shares_at
 
-# These numbers were chosen by trials on hip muscles. The smoothing length of the shares, in triangle sizes (more rounds corners).
+# These parameters were chosen by trials on hip muscles. The smoothing length of the shares, in triangle sizes (a larger value
+# rounds corners more).
 _SMOOTHED = 0.1
-# A vertex within this fraction of the edge from a crossing moves to it. Above 0.35 triangles degenerate; below 0.25 slivers remain.
+# A vertex that is nearer to a crossing than this fraction of the edge moves onto it. Above 0.35 triangles degenerate; below 0.25
+# slivers remain.
 _NEAR = 0.3
-# A fixed vertex closer to a crossing than this fraction of the edge counts as on the rim.
+# A vertex that cannot move and is nearer to a crossing than this fraction of the edge counts as on the rim.
 _THERE = 0.2
-# An edge across a piece of an attachment, or across a gap in it, is cut if it lies in the piece or gap by more than this fraction.
+# An edge across a piece of an attachment, or across a gap in it, is cut if more than this fraction of it is in the piece or gap.
 _NARROW = 0.3
 _REFINED = 2  # number of rounds of the search for narrow pieces and gaps
-_ISLAND = 0.1  # the minimum area of an island of an attachment that is kept, in squares of the triangle size
+_ISLAND = 0.1  # the minimum area of an island of an attachment that is kept, relative to the squared triangle size
 _WIDENED = 0.1  # the maximum outward movement of a rim in each round, in triangle sizes
-_SAMPLES = 17  # number of samples of the shares along an edge
-_TRIALS = 10  # number of trials of the level, to match the area
+_SAMPLES = 17  # the number of samples of the shares along an edge
+_TRIALS = 10  # the number of trials of the level whose line encloses the original area
 
 
 def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size: float) -> tuple[Surface, Ints]:
-    """A ``coarse`` surface with edges of length ``size`` [mm], cut along the rims of attachments; and the labels (m,) of its m
-    triangles: 0 free, i + 1 attached by attachment i. Attachments are defined on the ``fine`` surface, by the attached ``shares``
-    (k, 3) of the corners of its triangles.
+    """Cut a ``coarse`` surface along the rims of attachments. Returns the surface and the label (m,) of each of its m triangles: 0
+    if it is free, i + 1 if it is in attachment i. ``fine``: the surface on which attachments are defined, by the attached
+    ``shares`` (k, 3) of the corners of its triangles; ``size`` [mm]: the length of the edges of the coarse surface.
 
-    The shares are smoothed over a tenth of ``size``, which drops single vertices and pinholes; the rim is the level line that
+    The shares are smoothed over a tenth of ``size``, which removes single vertices and pinholes. The rim is the level line that
     encloses the original area. Vertices near the rim move onto it, and edges across it are cut there (Labelle and Shewchuk 2007,
-    doi 10.1145/1276377.1276448, for surfaces).
+    doi 10.1145/1276377.1276448, adapted to surfaces).
     """
     free = np.zeros(len(coarse.triangles), np.int64)
     parts = Parts(coarse.points, coarse.triangles, free, np.zeros(len(coarse.points), bool))
@@ -60,7 +62,7 @@ def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size
 
 
 def _smoothed(surface: Surface, shares: Floats, length: float) -> Floats:
-    """The ``shares`` (m, 3) after one implicit step of diffusion over ``length`` [mm], not across sharp edges."""
+    """Smooth the ``shares`` (m, 3) by one implicit step of diffusion over ``length`` [mm], but not across sharp edges."""
     nodes = sectors(surface)
     count = int(nodes.max()) + 1
     corners = surface.points[surface.triangles]
@@ -83,7 +85,7 @@ def _smoothed(surface: Surface, shares: Floats, length: float) -> Floats:
 
 
 def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
-    """The parts with a new point in the middle of each island of an attachment that has ``least`` [mm2] or more but no point."""
+    """Add a point in each island of an attachment that has at least ``least`` [mm2] but contains no point of the coarse surface."""
     number = _islands(fine, shares)
     attached = number >= 0
     thirds = np.tile(triangle_areas(fine.points, fine.triangles)[:, None] / 3, 3)
@@ -105,7 +107,7 @@ def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
 
 
 def _islands(fine: Surface, shares: Floats) -> Ints:
-    """The index (m, 3) of the connected island of shares above 1/2 that contains each corner, -1 outside all islands."""
+    """Index (m, 3) of the connected island of shares above 1/2 to which each corner belongs, -1 for corners outside all islands."""
     attached = np.zeros(len(fine.points), bool)
     attached[fine.triangles[shares > 1 / 2]] = True
     ends = fine.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -115,7 +117,7 @@ def _islands(fine: Surface, shares: Floats) -> Ints:
 
 
 def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) -> Parts:
-    """The parts with the rim at the level whose area is closest to ``area`` [mm2], by bisection."""
+    """Find the level at which the attached area is closest to ``area`` [mm2], by bisection, and return the parts with that rim."""
     for _ in range(_REFINED):
         parts = _refined(parts, fine, _Edges.of(parts, fine, shares))
     edges = _Edges.of(parts, fine, shares)
@@ -131,7 +133,7 @@ def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) 
 
 
 def _refined(parts: Parts, fine: Surface, edges: "_Edges") -> Parts:
-    """The parts after cuts of edges that are above the level 1/2 along much of their length, but not at their ends."""
+    """Cut edges of which a large part, but neither end, is on the other side of the level 1/2."""
     other = (edges.along > 1 / 2) != (edges.along[:, :1] > 1 / 2)
     narrow = np.flatnonzero((other.mean(axis=1) > _NARROW) & ~other[:, -1])
     at = (other[narrow] @ np.arange(_SAMPLES) / other[narrow].sum(axis=1) / (_SAMPLES - 1))[:, None]
@@ -144,8 +146,8 @@ def _refined(parts: Parts, fine: Surface, edges: "_Edges") -> Parts:
 
 @dataclass(frozen=True, eq=False)
 class _Edges:
-    """Shares along the edges of a surface: ``ends`` (e, 2), ``of_triangles`` (m, 3), the edge opposite to each corner, ``along``
-    (e, s) samples from end to end, ``at_points`` (n,) and ``at_middles`` (m,) of triangles.
+    """Shares along the edges of a surface. ``ends`` (e, 2): the vertices; ``of_triangles`` (m, 3): the edge opposite each corner;
+    ``along`` (e, s): samples from end to end; ``at_points`` (n,), ``at_middles`` (m,): the shares at points and triangle centroids.
     """
 
     ends: Ints
@@ -181,8 +183,9 @@ class _Edges:
 
 @dataclass(frozen=True, eq=False)
 class _Crossings:
-    """The points at which ``edges`` first and last cross a level: at ``fractions`` (e, 2) of their length, NaN without a
-    crossing; ``signs`` (n,) of the points, and the mask ``within`` (m,) of the middles of triangles.
+    """Crossings of ``edges`` with a level. ``fractions`` (e, 2): the first and the last crossing of each edge, as fractions of its
+    length, NaN if there is none; ``signs`` (n,): 1 for points above the level, else -1; ``within`` (m,): mask of triangles with a
+    centroid above the level.
     """
 
     edges: _Edges
@@ -192,7 +195,7 @@ class _Crossings:
 
 
 def _cut(parts: Parts, fine: Surface, crossings: _Crossings, label: int) -> Parts:
-    """The parts with triangles cut along the crossings; free triangles inside get the ``label``."""
+    """Cut triangles along the crossings; free triangles inside get the ``label``."""
     points, signs = _snapped(parts, fine, crossings)
     ends = crossings.edges.ends
     split = np.flatnonzero(signs[ends[:, 0]] * signs[ends[:, 1]] < 0)
@@ -230,7 +233,7 @@ def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats
 
 
 def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Floats) -> tuple[Floats, Ints, Ints]:
-    """Points and triangles, the ``chosen`` edges cut at ``middles`` (k, 3) moved to ``fine``, and the original triangle of each."""
+    """Return the points, the triangles after cuts of the ``chosen`` edges at ``middles`` (k, 3) on ``fine``, and their parents."""
     new = np.full(len(edges.ends), -1)
     new[chosen] = len(parts.points) + np.arange(len(chosen))
     points = np.concatenate([parts.points, distances(middles, fine).closest])
@@ -238,7 +241,7 @@ def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Fl
 
 
 def _divided(points: Floats, triangles: Ints, cuts: Ints) -> tuple[Ints, Ints]:
-    """Triangles cut at the points ``cuts`` (m, 3) opposite to their corners, -1 for none; and the index of the original of each."""
+    """Cut triangles at the points ``cuts`` (m, 3) opposite their corners, -1 for none; returns the triangles and their parents."""
     count = (cuts >= 0).sum(axis=1)
     pieces, parents = [triangles[count == 0]], [np.flatnonzero(count == 0)]
     one = np.flatnonzero(count == 1)
@@ -258,6 +261,6 @@ def _divided(points: Floats, triangles: Ints, cuts: Ints) -> tuple[Ints, Ints]:
 
 
 def _turned(triangles: Ints, cuts: Ints, chosen: Ints, first: Ints) -> tuple[Ints, ...]:
-    """Corners (k,) of the ``chosen`` triangles, and the cuts opposite to them, from corner ``first`` on."""
+    """Return the corners (k,) of the ``chosen`` triangles and the cuts opposite them, in order from the corner ``first`` (k,)."""
     turn = (first[:, None] + np.arange(3)) % 3
     return (*triangles[chosen[:, None], turn].T, *cuts[chosen[:, None], turn].T)

@@ -1,16 +1,16 @@
-"""Smooth sectors around the vertices of a surface, and the attached shares of triangles."""
+"""Smooth sectors around the vertices of a surface, and the attached shares of the corners of triangles."""
 
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, corner_fans, triangle_areas, twins, unit_normals
 from fem_reference.geometry.distance import distances
 
-# Two triangles meet in a sharp edge if the angle between their normals exceeds 45 degrees.
+# The edge between two triangles is sharp if the angle between their normals exceeds 45 degrees.
 _SHARP = np.cos(np.radians(45))
 
 
 def sectors(surface: Surface) -> Ints:
-    """The index (m, 3) of the sector of each corner of the triangles: the part around a vertex from one sharp edge to the next."""
+    """Index (m, 3) of the sector of each corner of the triangles: the part around a vertex from one sharp edge to the next."""
     triangles = surface.triangles
     normals = unit_normals(surface.points[triangles])
     one, other = twins(triangles).T
@@ -19,10 +19,10 @@ def sectors(surface: Surface) -> Ints:
 
 
 def attached_shares(surface: Surface, vertices: Ints) -> Floats:
-    """The attached share, 1 or 0, of each corner (m, 3) of the triangles of ``surface``, for attached ``vertices`` (k,).
+    """Attached share, 1 or 0, of each corner (m, 3) of the triangles of ``surface``, for the attached ``vertices`` (k,).
 
-    A vertex on a sharp edge attaches only the sides of the edge on which a triangle at the vertex is completely attached, if any.
-    This attaches the end of a muscle, but not a strip of arbitrary width of the belly next to it.
+    If any triangle at a vertex is completely attached, only the corners there in a sector with such a triangle are attached, not
+    those across a sharp edge. This attaches the end of a muscle, but not a strip of arbitrary width of the belly next to it.
     """
     attached = np.zeros(len(surface.points), bool)
     attached[vertices] = True
@@ -37,11 +37,11 @@ def attached_shares(surface: Surface, vertices: Ints) -> Floats:
 
 
 def attached_area(surface: Surface, shares: Floats) -> float:
-    """The attached area [mm2] of ``surface``, by the ``shares`` (m, 3) of the corners."""
+    """Attached area [mm2] of ``surface``, from the ``shares`` (m, 3) of the corners of its triangles."""
     return float(triangle_areas(surface.points, surface.triangles) @ shares.mean(axis=1))
 
 
 def shares_at(points: Floats, surface: Surface, shares: Floats) -> Floats:
-    """The attached shares (n,) at the points of a ``surface`` nearest to ``points`` (n, 3) [mm], from corner ``shares`` (m, 3)."""
+    """Attached shares (n,) at the points of a ``surface`` nearest to ``points`` (n, 3) [mm], from the corner ``shares`` (m, 3)."""
     nearest = distances(points, surface)
     return np.asarray(np.sum(shares[nearest.triangle] * nearest.barycentric, axis=1))

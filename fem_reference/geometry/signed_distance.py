@@ -1,6 +1,6 @@
-"""Signed distance to a body with a triangulated surface: sampled once on a regular grid, in which it is twice differentiable.
+"""Signed distance to a bone with a triangulated surface, sampled once on a regular grid, inside which it is twice differentiable.
 
-Tricubic B-splines interpolate between the nodes, so that gradient and curvature are continuous, as Newton's method requires.
+Tricubic B-splines interpolate between the nodes, so gradient and curvature are continuous, as Newton's method requires.
 """
 
 import logging
@@ -27,25 +27,26 @@ from fem_reference.foundations.mesh import (
 )
 from fem_reference.geometry.clearance import Clearance, of_spline
 from fem_reference.geometry.distance import distances, inside
-from fem_reference.geometry.kept_meshes import kept
+from fem_reference.geometry.kept_meshes import code, kept
 from fem_reference.geometry.rigid_bodies import Sampled, Vector
 
-# The distance [mm] returned outside a grid: far from everything, but finite.
+# The distance [mm] returned outside a grid: farther than any real distance, but finite.
 FAR = 1e6
 # The maximum number of nodes of a grid that ``resolve`` refines: 256 cubed, 134 MB.
 MOST_NODES = 2**24
-# The first grid of ``resolve`` has about this many cells along its longest edge.
+# The approximate number of cells along the longest edge of the first grid of ``resolve``.
 _FIRST_CELLS = 24
-# The distance is exact for this many cells beyond the margin: in a spline the influence of an error falls by 73 % per cell.
+# The distance is exact at the nodes up to this many cells beyond the margin: in a spline, the influence of an error falls by 73 %
+# per cell.
 _FORGETTING = 4
-# Every fourth node along an axis is exact everywhere; the others only near the surface.
+# The distance is exact at every fourth node along each axis; at the other nodes, it is exact only near the surface.
 _STRIDE = 4
 # The number of random points on and around the surface at which the error is sampled.
 _PROBES = 30_000
 _CHUNK = 1_000_000
 # The number of points evaluated at a time.
 _AT_ONCE = 10_000
-# The polynomial coefficients for powers 0 to 3 (columns) of the four cubic B-splines that reach into a cell (rows).
+# The polynomial coefficients, for the powers 0 to 3 (columns), of the four cubic B-splines that extend into a cell (rows).
 _SPLINES = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6
 
 logger = logging.getLogger(__name__)
@@ -55,12 +56,11 @@ logger = logging.getLogger(__name__)
 class Grid:
     """The shape of a bone whose signed distance is a tricubic spline.
 
-    ``coefficients`` (i, j, k) [mm] of the B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``. The distance
-    is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and ``FAR`` outside the grid.
-    ``error`` [mm] is the largest sampled difference from the exact distance within one spacing of the surface, and
-    ``mean_error`` [mm] the root mean square, not the mean, of the differences there. Farther away, the ridges between two close
-    parts of the surface are rounded like edges, by a third of a spacing. The gradient is that of the spline: its length is 1 within
-    a few per cent, except on edges.
+    ``coefficients`` (i, j, k) [mm]: the coefficients of B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``.
+    The distance is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and it is ``FAR`` outside the
+    grid. ``error`` [mm]: the largest sampled difference from the exact distance within one spacing of the surface.
+    ``mean_error`` [mm]: the root mean square, not the mean, of these differences. Farther away, ridges between two close parts of
+    the surface are rounded, like edges, by a third of a spacing. The gradient has length 1 within a few per cent, except on edges.
     """
 
     coefficients: Floats
@@ -75,22 +75,22 @@ class Grid:
 
     @cached_property
     def steepest(self) -> float:
-        """A bound on the length of the gradient: along each axis a spline is no steeper than the steps of its coefficients."""
+        """An upper bound on the gradient: along each axis a spline is no steeper than the steps between its coefficients."""
         steps = [np.abs(np.diff(self.coefficients, axis=axis)).max() for axis in range(3)]
         return float(np.linalg.norm(steps)) / self.spacing
 
     @cached_property
     def half_thickness(self) -> float:
-        """A bound on the maximum depth [mm], from the least coefficient; infinite if the nodes are too far apart for a bound."""
+        """An upper bound on the depth [mm], from the smallest coefficient; infinite if the nodes are too far apart for one."""
         deepest = float(-self.coefficients.min())
         return deepest if deepest > self.spacing else np.inf
 
     def clearance(self, within: float) -> Clearance:
-        """A lower bound on the length of paths from given points to any point whose distance is at most ``within`` [mm]."""
+        """Return a lower bound on the length of paths from given points to any point whose distance is at most ``within`` [mm]."""
         return of_spline(self.coefficients, np.asarray(self.origin), self.spacing, within)
 
     def sample(self, points: Floats) -> Sampled:
-        """Distance, gradient and curvature at ``points`` (n, 3) [mm]: ``FAR`` and 0 outside the grid, NaN where a coordinate is."""
+        """Distance, gradient and curvature at ``points`` (n, 3) [mm]: ``FAR`` and 0 outside the grid, NaN for NaN coordinates."""
         found = Sampled(np.full(len(points), FAR), np.zeros((len(points), 3)), np.zeros((len(points), 3, 3)))
         found.distance[~np.isfinite(points).all(axis=1)] = np.nan
         for chunk, at in self._inside(points):
@@ -99,21 +99,21 @@ class Grid:
         return found
 
     def distances(self, points: Floats) -> Floats:
-        """The distance (n,) of :meth:`sample` alone, in half the time."""
+        """The distance (n,) of :meth:`sample`, without the derivatives, in half the time."""
         found = np.where(np.isfinite(points).all(axis=1), FAR, np.nan)
         for chunk, at in self._inside(points):
             found[chunk] = self._values(at, 1).ravel()
         return found
 
     def _inside(self, points: Floats) -> Iterator[tuple[Ints, Floats]]:
-        """Chunks of the indices of ``points`` (n, 3) inside the grid, with their positions in units of cells from its origin."""
+        """Yield chunks of the indices of ``points`` (n, 3) inside the grid, and their positions in cells from the origin."""
         at = (points - self.origin) / self.spacing
         inside = np.flatnonzero(((at >= 1) & (at <= np.array(self.coefficients.shape) - 2)).all(axis=1))
         for chunk in np.split(inside, range(_AT_ONCE, len(inside), _AT_ONCE)) if len(inside) else ():
             yield chunk, at[chunk]
 
     def _values(self, at: Floats, orders: int) -> Floats:
-        """The derivatives below ``orders`` along x, y and z, (n, orders, orders, orders), per cell, at positions (n, 3)."""
+        """Derivatives (n, orders, orders, orders) of orders below ``orders`` along x, y and z, per cell, at positions (n, 3)."""
         shape = self.coefficients.shape
         cell = np.minimum(at.astype(np.int64), np.array(shape) - 3)
         x, y, z = (_weights(at[:, axis] - cell[:, axis], orders) for axis in range(3))
@@ -134,7 +134,7 @@ class Grid:
 
 
 def _weights(within: Floats, orders: int) -> Floats:
-    """The value and derivatives below ``orders``, (n, orders, 4), of the four B-splines of a cell at ``within`` (n,), 0 to 1."""
+    """Value and derivatives below ``orders``, (n, orders, 4), of the four B-splines of a cell at ``within`` (n,), from 0 to 1."""
     one, none = np.ones_like(within), np.zeros_like(within)
     found = [np.stack([one, within, within**2, within**3], axis=1)]
     if orders > 1:
@@ -144,8 +144,9 @@ def _weights(within: Floats, orders: int) -> Floats:
 
 
 def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:
-    """The signed distance to a closed ``surface``, sampled on a grid with nodes ``spacing`` [mm] apart, and valid within ``margin``
-    [mm] of it. Individual triangles may have any orientation; InputError if the surface bounds no body, as in ``check_closed``.
+    """Sample the signed distance to a closed ``surface`` on a grid with nodes ``spacing`` [mm] apart; it is valid within
+    ``margin`` [mm]. Triangles may have any orientation. Raises InputError if the surface does not bound one body (see
+    ``check_closed``).
 
     ``rounding`` is the standard deviation s [mm] of a Gaussian filter of the distance, used because contact does not slide smoothly
     along flat triangles. A surface with a mean curvature of 1/r moves inward by s^2/r; this shift is part of the error.
@@ -163,11 +164,11 @@ def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0
 
 
 def resolve(surface: Surface, error: float, margin: float) -> Grid:
-    """The grid of :func:`build` whose spacing is halved until its ``mean_error`` is at most ``error`` [mm] or ``MOST_NODES`` is
-    reached; the grid's ``mean_error`` states the reached error.
+    """Halve the spacing of a grid until its ``mean_error`` is at most ``error`` [mm] or ``MOST_NODES`` would be exceeded. Returns
+    the last grid, whose ``mean_error`` is the error that was reached.
 
-    The largest error is not a suitable measure. On sharp edges and thin rims, which a grid rounds, it decreases only in proportion
-    to the spacing; in a slit narrower than a cell it does not decrease.
+    The largest error would not be a suitable criterion: on sharp edges and thin rims, which a grid rounds, it decreases only in
+    proportion to the spacing, and in a slit narrower than a cell it does not decrease.
     """
     spacing = float(np.ptp(surface.points, axis=0).max()) / _FIRST_CELLS
     grid = build(surface, spacing, margin)
@@ -181,9 +182,11 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
 
 
 def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
-    """The grid of :func:`build` at the spacing of :func:`resolve`, stored in ``folder`` under a hash of all its inputs."""
-    code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
-    name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
+    """Return the grid of :func:`build` at the spacing found by :func:`resolve`, stored in ``folder`` under a hash of its inputs and
+    of the code that computes it.
+    """
+    source = np.frombuffer(code().encode(), np.uint8)
+    name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), source)
 
     def make() -> Grid:
         grid = resolve(surface, error, margin)
@@ -198,13 +201,13 @@ def _grid(arrays: dict[str, Any]) -> Grid:
 
 
 def _extent(surface: Surface, spacing: float, margin: float) -> tuple[Floats, tuple[int, ...]]:
-    """The first node (3,) [mm] of a grid that reaches ``margin`` and a cell beyond ``surface``, and the numbers of nodes."""
+    """Return the first node (3,) [mm] of a grid that extends ``margin`` and a cell beyond ``surface``, and the number of nodes."""
     low, high = surface.points.min(axis=0) - margin - spacing, surface.points.max(axis=0) + margin + spacing
     return low, tuple(int(count) for count in np.ceil((high - low) / spacing) + 1)
 
 
 def signed_distances(points: Floats, surface: Surface) -> Floats:
-    """Exact distance (n,) [mm] of ``points`` (n, 3) to a closed ``surface``, negative inside, by winding number."""
+    """Exact distance (n,) [mm] of ``points`` (n, 3) to a closed ``surface``, negative inside according to the winding number."""
     found = [
         np.where(inside(surface, chunk), -1.0, 1.0) * distances(chunk, surface).distance
         for chunk in np.array_split(np.ascontiguousarray(points), 1 + len(points) // _CHUNK)
@@ -213,27 +216,27 @@ def signed_distances(points: Floats, surface: Surface) -> Floats:
 
 
 def _on_nodes(surface: Surface, low: Floats, shape: tuple[int, ...], spacing: float, margin: float) -> Floats:
-    """The distance at nodes: exact within the margin and a few cells beyond it, elsewhere trilinear between every fourth node."""
+    """Distance at the nodes: exact within the margin and a few cells beyond it, elsewhere interpolated from every fourth node."""
     coarse_shape = [-(-(count - 1) // _STRIDE) + 1 for count in shape]
     coarse_points = low + np.moveaxis(np.indices(coarse_shape), 0, -1).reshape(-1, 3) * (_STRIDE * spacing)
     coarse = signed_distances(coarse_points, surface).reshape(coarse_shape)
     stretch = [((count - 1) * _STRIDE + 1) / count for count in coarse_shape]
     values: Floats = scipy.ndimage.zoom(coarse, stretch, order=1)[tuple(slice(count) for count in shape)]
-    # The error of trilinear values is at most half the diagonal of a coarse cell, as the gradient of a distance has length 1.
+    # The error of interpolated values is at most half the diagonal of a coarse cell, as the gradient of a distance has length 1.
     near = np.abs(values) < margin + (_FORGETTING + 0.75**0.5 * _STRIDE) * spacing
     values[near] = signed_distances(low + np.argwhere(near) * spacing, surface)
     return values
 
 
 def _coefficients(values: Floats) -> Floats:
-    """Coefficients of the B-splines through ``values`` (i, j, k), and one more on each side, by odd reflection at the border."""
+    """Coefficients of the B-splines through ``values`` (i, j, k), with one more on each side by odd reflection at the border."""
     beyond = np.pad(values, _FORGETTING, mode="reflect", reflect_type="odd")
     keep = slice(_FORGETTING - 1, 1 - _FORGETTING)
     return np.asarray(scipy.ndimage.spline_filter(beyond, order=3)[keep, keep, keep])
 
 
 def _errors(grid: Grid, surface: Surface) -> tuple[float, float]:
-    """The largest difference [mm] from the exact distance on the surface and near it; the root mean square near it."""
+    """Return the largest difference [mm] from the exact distance on the surface and near it, and the root mean square near it."""
     around = _around(surface, grid.spacing)
     beside = grid.sample(around).distance - signed_distances(around, surface)
     largest = max(np.abs(grid.sample(_on(surface)).distance).max(), np.abs(beside).max())
@@ -241,7 +244,7 @@ def _errors(grid: Grid, surface: Surface) -> tuple[float, float]:
 
 
 def _on(surface: Surface) -> Floats:
-    """All vertices, the midpoints of edges and triangles, and random points on edges, more on longer edges: (n, 3) [mm]."""
+    """Return all vertices, the midpoints of edges and triangles, and random points on edges (more on longer edges): (n, 3) [mm]."""
     random = np.random.default_rng(0)
     ends = surface.points[surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
@@ -252,7 +255,7 @@ def _on(surface: Surface) -> Floats:
 
 
 def _around(surface: Surface, reach: float) -> Floats:
-    """Random points (n, 3) on the triangles, moved by up to ``reach`` [mm] in any direction; the same every time."""
+    """Return random points (n, 3) on the triangles, moved by up to ``reach`` [mm] in any direction; the same on every call."""
     random = np.random.default_rng(1)
     areas = triangle_areas(surface.points, surface.triangles)
     corners = surface.points[surface.triangles[random.choice(len(areas), _PROBES, p=areas / areas.sum())]]

@@ -1,4 +1,4 @@
-"""Fibres inside a muscle by Catmull-Rom splines between fibres on its surface: the CHMD of Kohout and Cholt (report 6.1.2)."""
+"""Fibres inside a muscle from Catmull-Rom splines between fibres on its surface: the CHMD of Kohout and Cholt (report 6.1.2)."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -10,15 +10,15 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.geometry.curves import catmull_rom, knots
 from fem_reference.geometry.fibres import POINTS, resample
 
-_THIN = 1e-6  # the squared ratio of a section's thickness to its width below which its lines count as on one surface
+_THIN = 1e-6  # the squared ratio of thickness to width of a section below which its lines count as on one surface
 _GOLDEN = np.pi * (3 - np.sqrt(5))  # the golden angle [rad], as between consecutive seeds of a sunflower
 
 
 def between(heads: Sequence[Polylines], count: int) -> Polylines:
-    """``count`` lines of 40 points between the surface fibres of each of ``heads``, in proportion to their mean cross-sections.
+    """Create ``count`` lines of 40 points between the surface fibres of each of ``heads``, more in heads of larger cross-section.
 
-    The surface fibres of a head, three or more in any order, must surround it. Each point of a line is on a spline through two
-    opposite points of a closed spline around the head and the mean of its fibres.
+    The surface fibres of a head, three or more in any order, must surround it. Each point of a line is on a spline through three
+    points: two opposite points of a closed spline around the head, and the mean of its fibres between them.
     """
     grids = [_around(_alike(lines, i)) for i, lines in enumerate(heads)]
     lines = [line for grid, share in zip(grids, _shares(grids, count), strict=True) for line in _inside(grid, share)]
@@ -26,7 +26,7 @@ def between(heads: Sequence[Polylines], count: int) -> Polylines:
 
 
 def _alike(lines: Polylines, head: int) -> Floats:
-    """The lines of a head as (m, 40, 3), all in the direction of the first."""
+    """Resample the lines of a head to (m, 40, 3), all in the direction of the first line."""
     if len(lines) < 3:
         raise InputError(f"fibres.chmd.heads[{head}]", f"{len(lines)} surface fibres", "three or more, around the head")
     found = np.stack([resample(lines.points[low:high]) for low, high in pairwise(lines.offsets)])
@@ -37,14 +37,14 @@ def _alike(lines: Polylines, head: int) -> Floats:
 
 
 def _around(lines: Floats) -> Floats:
-    """The ``lines`` (m, 40, 3) in the order of their angles halfway, the farthest first."""
+    """Sort ``lines`` (m, 40, 3) by the angles of their midpoints around the head, beginning with the farthest."""
     arms = _halfway(lines)
     angles = np.arctan2(arms[:, 1], arms[:, 0]) % (2 * np.pi)
     return np.asarray(lines[np.argsort(np.where(angles > 2 * np.pi - 1e-9, 0.0, angles))])
 
 
 def _halfway(lines: Floats) -> Floats:
-    """The positions (m, 2) [mm] of ``lines`` (m, 40, 3) halfway, from their mean and across it; the farthest on the first axis."""
+    """Positions (m, 2) [mm] of the midpoints of ``lines`` (m, 40, 3) across their mean line; the farthest is on the first axis."""
     mean = lines.mean(axis=0)
     normal = mean[POINTS // 2 + 1] - mean[POINTS // 2 - 1]
     normal /= np.linalg.norm(normal)
@@ -56,8 +56,9 @@ def _halfway(lines: Floats) -> Floats:
 
 
 def outermost(lines: Polylines, count: int) -> Polylines:
-    """At most ``count`` of ``lines``, with 40 points each: the line that is outermost halfway in each of ``count`` sectors. Sectors
-    are equal after a stretch that makes the section equally wide in all directions, so that a flat muscle has lines on all sides.
+    """Return at most ``count`` of ``lines``, with 40 points each: in each of ``count`` sectors, the line whose midpoint is
+    outermost. The sectors are equal after a stretch that makes the section equally wide in all directions, so that all sides of a
+    flat muscle have lines.
     """
     found = _alike(lines, 0)
     arms = _halfway(found)
@@ -75,7 +76,7 @@ def outermost(lines: Polylines, count: int) -> Polylines:
 
 
 def _shares(grids: Sequence[Floats], count: int) -> Ints:
-    """The number (len(grids),) of lines of each head, in proportion to its mean cross-section, ``count`` in all."""
+    """Number (len(grids),) of lines of each head, in proportion to its mean cross-section, ``count`` in total."""
     arms = [grid - grid.mean(axis=0) for grid in grids]
     corners = [np.cross(arm, np.roll(arm, -1, axis=0)).sum(axis=0) for arm in arms]
     areas = [np.linalg.norm(one, axis=1).mean() for one in corners]
@@ -86,7 +87,7 @@ def _shares(grids: Sequence[Floats], count: int) -> Ints:
 
 
 def _inside(grid: Floats, count: int) -> list[Floats]:
-    """``count`` lines (40, 3) in a head of surface fibres ``grid`` (m, 40, 3), spread like the seeds of a sunflower."""
+    """Create ``count`` lines (40, 3) in a head with surface fibres ``grid`` (m, 40, 3), spread like the seeds of a sunflower."""
     order = np.arange(count)
     radii, turns = np.sqrt((order + 0.5) / max(count, 1)), (order * _GOLDEN / (2 * np.pi)) % 1
     centres, found = grid.mean(axis=0), np.empty((count, POINTS, 3))
@@ -98,7 +99,7 @@ def _inside(grid: Floats, count: int) -> list[Floats]:
 
 
 def _loop(points: Floats, turns: Floats) -> Floats:
-    """Points (n, 3) after ``turns`` (n,) of a closed spline through ``points`` (m, 3); straight where two of these coincide."""
+    """Points (n, 3) at the fractions ``turns`` (n,) of a closed spline through ``points`` (m, 3), or a polygon if two coincide."""
     closed = np.concatenate([points[-2:], points, points[:3]])
     at = turns * len(points) + 2
     if np.linalg.norm(np.diff(closed, axis=0), axis=1).min() == 0:
@@ -108,7 +109,7 @@ def _loop(points: Floats, turns: Floats) -> Floats:
 
 
 def _across(points: Floats, radius: float) -> Floats:
-    """The point (3,) of a spline through three ``points`` (3, 3) at a ``radius``, 1 at the first and 0 at the second."""
+    """Point (3,) on a spline through three ``points`` (3, 3), at a ``radius`` that is 1 at the first and 0 at the second."""
     if np.linalg.norm(np.diff(points, axis=0), axis=1).min() == 0:
         return np.asarray(points[1] + radius * (points[0] - points[1]))
     middle = knots(points, 0.5)[1]

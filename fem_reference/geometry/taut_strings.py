@@ -1,4 +1,4 @@
-"""Taut strings of points around obstacles: nearly the shortest paths, and the obstacles that they touch."""
+"""Taut strings of points around obstacles, which approximate the shortest paths and show which obstacles these touch."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -11,17 +11,18 @@ from fem_reference.geometry.obstacles import Ring, SmoothSurface
 
 Flags = NDArray[np.bool_]
 
-# Numbers of pieces of a string and of sweeps over it, and their overrelaxation: 1 moves a point to the middle of its neighbours.
+# The number of pieces of a string, the number of sweeps over it, and the overrelaxation of a sweep (1 moves a point to the midpoint
+# of its neighbours).
 _PIECES, _SWEEPS, _BEYOND = 48, 120, 1.8
-# The maximum number of points of a string; around a very thin tube, more would be needed so that no piece slips past it.
+# The maximum number of points of a string; very thin tubes would need more, so that no piece slips past them.
 MOST = 10_000
 
 
 def taut(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Floats:
-    """Points (n, N, 3) of strings that are nearly taut: each in the middle of its neighbours, or on an obstacle."""
+    """Points (n, N, 3) of n strings that are nearly taut: each point is at the midpoint of its neighbours or on an obstacle."""
     rings = [one for one in obstacles if isinstance(one, Ring)]
     string = _piecewise([starts, *(ring.through(starts, ends) for ring in rings), ends])
-    # Points are moved aside slightly, as a point in the middle of an obstacle has no direction out of it.
+    # Points are moved aside slightly, because from the centre of an obstacle no direction leads out of it.
     aside = 1e-6 * np.cross(ends - starts, np.eye(3)[np.argmin(np.abs(ends - starts), axis=1)])
     string[:, 1:-1] += aside[:, None]
     for ring in rings:  # no piece may slip past the tube
@@ -38,21 +39,23 @@ def taut(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Fl
 
 
 def _piecewise(stations: list[Floats]) -> Floats:
-    """Points (n, N, 3) on straight pieces through ``stations`` (n, 3)."""
+    """Points (n, N, 3) on the straight lines through ``stations``, points (n, 3) of n strings."""
     shares = (np.arange(_PIECES) / _PIECES)[:, None]
     parts = [one[:, None] + shares * (other - one)[:, None] for one, other in pairwise(stations)]
     return np.concatenate([*parts, stations[-1][:, None]], axis=1)
 
 
 def halved(string: Floats) -> Floats:
-    """The strings (n, N, 3) with a point in the middle of each piece, (n, 2 N - 1, 3)."""
+    """Insert a point at the midpoint of each piece of the strings (n, N, 3); returns (n, 2 N - 1, 3)."""
     finer = np.repeat(string, 2, axis=1)[:, :-1]
     finer[:, 1::2] = (string[:, :-1] + string[:, 1:]) / 2
     return finer
 
 
 def touching(obstacle: SmoothSurface, string: Floats) -> Flags:
-    """Mask (n, N) of the points of strings that may touch an obstacle: nearer to it than its tangent a third of a piece away."""
+    """Mask (n, N) of the points of strings that may touch an obstacle: they are nearer to it than a tangent is, a third of a piece
+    away from the point at which the tangent touches it.
+    """
     value, slope = obstacle.level(string.reshape(-1, 3))
     away = (value / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)).reshape(string.shape[:2])
     piece = np.linalg.norm(np.diff(string, axis=1), axis=2).max(axis=1) * 2
@@ -60,7 +63,7 @@ def touching(obstacle: SmoothSurface, string: Floats) -> Flags:
 
 
 def met(obstacles: Sequence[SmoothSurface], string: Floats) -> list[tuple[int, ...]]:
-    """The obstacles that each path may touch, in their order along the path."""
+    """Return the obstacles that each path may touch, in the order in which the path passes them."""
     flags = np.array([touching(obstacle, halved(string)) for obstacle in obstacles])
     count = flags.sum(axis=2)
     middle = (flags * np.arange(flags.shape[2])).sum(axis=2) / np.maximum(count, 1)
@@ -69,7 +72,7 @@ def met(obstacles: Sequence[SmoothSurface], string: Floats) -> list[tuple[int, .
 
 
 def longest(flags: Flags) -> tuple[Ints, Ints]:
-    """The first and the last index of the longest run of True in each row (n, N)."""
+    """Return the indices of the first and the last entry of the longest run of True in each row (n, N)."""
     run = np.zeros(flags.shape, dtype=np.int64)
     for i, column in enumerate(flags.T):
         run[:, i] = np.where(column, run[:, i - 1] + 1, 0)

@@ -1,6 +1,6 @@
-"""Closed triangulated surfaces of bones of simple shapes, for pictures and for code that needs the surface of a bone.
+"""Closed triangulated surfaces of bones of simple shapes, for pictures and for code that needs triangles.
 
-Their vertices lie on the body. A sphere, a capsule and a box are built in the same way, from the octants of a sphere moved apart.
+The vertices lie on the surface of the shape. Spheres, capsules and boxes are all built from the octants of a sphere, moved apart.
 """
 
 import numpy as np
@@ -9,17 +9,17 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal
 from fem_reference.geometry.block import lattice_skin
 from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere, Vector
 
-# Number of sides of a full turn, a multiple of eight: triangles then lie at most 0.36 % of the radius inside the body.
+# The number of sides of a full circle, a multiple of eight. Triangles then lie at most 0.36 % of the radius inside the shape.
 TURN = 64
-# For a half-space: half the side of its square and the thickness of its slab, relative to the extent of the points ``beside`` it.
+# For a half-space: half the side of its square, and the thickness of its slab, relative to the extent of the points ``beside`` it.
 _REACH, _THICKNESS = 1.5, 0.1
 
 
 def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -> Surface:
-    """The closed outward surface of a body of simple shape, with ``turn`` sides per full turn; errors name ``place``.
+    """Triangulate a bone of a simple shape: a closed outward surface with ``turn`` sides per full circle; errors name ``place``.
 
-    A half-space, which is infinite, is represented by a slab that extends past the points ``beside`` (n, 3) [mm]; only its
-    vertices in the plane lie on the body.
+    A half-space, which is infinite, is represented by a slab that extends beyond the points ``beside`` (n, 3) [mm]; only the slab's
+    vertices in the plane lie on the surface of the half-space.
     """
     match solid:
         case HalfSpace():
@@ -43,7 +43,7 @@ def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -
 
 
 def _slab(half_space: HalfSpace, beside: Floats) -> tuple[Floats, Ints]:
-    """A slab behind a square in the plane, centred below the points ``beside``."""
+    """Slab behind a square in the plane of a half-space, centred below the points ``beside``."""
     middle = (beside.max(axis=0) + beside.min(axis=0)) / 2
     size = diagonal(beside)
     frame = _frame(np.asarray(half_space.normal, float))
@@ -54,7 +54,7 @@ def _slab(half_space: HalfSpace, beside: Floats) -> tuple[Floats, Ints]:
 
 
 def _rounded(size: Vector, rounding: float, turn: int) -> tuple[Floats, Ints]:
-    """A box about the origin of outer ``size`` whose edges and corners have the radius ``rounding``."""
+    """Box about the origin with outer ``size`` and with edges and corners of the radius ``rounding``."""
     corners = [_ticks(length / 2 - rounding, rounding, turn // 8) for length in size]
     lattice, triangles = lattice_skin(tuple(len(tangents) - 1 for tangents, _ in corners))  # type: ignore[arg-type]
     direction = np.stack([tangents[lattice[:, axis]] for axis, (tangents, _) in enumerate(corners)], axis=1)
@@ -63,8 +63,9 @@ def _rounded(size: Vector, rounding: float, turn: int) -> tuple[Floats, Ints]:
 
 
 def _ticks(half: float, rounding: float, count: int) -> tuple[Floats, Floats]:
-    """The tangents of the angles, and the centres, of the rounded corners at -``half`` and ``half`` along an axis. Each corner has
-    ``count`` equal steps of angle from the middle of a face to the edge of a cube; two corners about one centre share their middle.
+    """Return the tangents of the angles, and the centres, of the rounded corners at -``half`` and ``half`` along an axis. Each
+    corner has ``count`` equal steps of angle from the centre of a face to the edge of a cube. Two corners with one centre share the
+    tangent 0.
     """
     if rounding == 0:
         return np.array([-1.0, 1.0]), np.array([-half, half])
@@ -76,7 +77,7 @@ def _ticks(half: float, rounding: float, count: int) -> tuple[Floats, Floats]:
 
 
 def _prism(cylinder: Cylinder, turn: int) -> tuple[Floats, Ints]:
-    """Both ends of the cylinder, as fans about their centres, and its lateral surface."""
+    """Surface of a cylinder: both ends, as fans about their centres, and the lateral surface."""
     angles = 2 * np.pi * np.arange(turn) / turn
     length = float(np.linalg.norm(np.subtract(cylinder.end, cylinder.start)))
     ring = cylinder.radius * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(turn)])
@@ -91,12 +92,12 @@ def _prism(cylinder: Cylinder, turn: int) -> tuple[Floats, Ints]:
 
 
 def _placed(start: Vector, end: Vector) -> tuple[Floats, Floats]:
-    """The middle (3,) of a segment, and a frame along it."""
+    """Return the midpoint (3,) of a segment and a frame (3, 3) whose last axis is along it."""
     return np.add(start, end) / 2, _frame(np.subtract(end, start, dtype=float))
 
 
 def _frame(direction: Floats) -> Floats:
-    """Three right-handed unit vectors in rows (3, 3), the last along ``direction`` (3,)."""
+    """Three right-handed unit vectors in rows (3, 3), the last of them along ``direction`` (3,)."""
     third = direction / np.linalg.norm(direction)
     first = np.cross(np.eye(3)[np.abs(third).argmin()], third)
     first /= np.linalg.norm(first)

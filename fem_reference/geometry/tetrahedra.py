@@ -1,6 +1,7 @@
-"""Filling of a closed surface with tetrahedra of high quality; the vertices of a finer surface are not kept.
+"""Filling of a closed surface with well-shaped tetrahedra. If the surface is finer than the tetrahedra, its vertices are not kept.
 
-``python -m fem_reference.geometry.tetrahedra JOB.npz RESULT.npz`` runs one mesher, which may crash, hang or keep global state.
+``python -m fem_reference.geometry.tetrahedra JOB.npz RESULT.npz`` runs one mesher in a process of its own, as a mesher may crash,
+hang or keep global state.
 """
 
 import logging
@@ -36,26 +37,25 @@ from fem_reference.geometry.rims import with_rims
 log = logging.getLogger(__name__)
 
 SECONDS_ALLOWED = 240.0
-_ROUNDED = 6  # decimals [mm] in the mesher's frame: far below any size, far above the round-off from moving a surface
-_VOLUME_WITHIN = (
-    0.05  # relative; a smaller value fails, as a surface with self-intersections has no well-defined volume
-)
-_MOST_TETS = 3e6  # a mesh that takes some GB and some minutes, and is far too large for a solver
+_ROUNDED = 6  # decimals [mm] in the mesher's frame: far finer than any mesh, far coarser than the round-off of a motion
+# The accepted relative difference in volume; a smaller value would fail, as the volume of a self-intersecting surface is ambiguous.
+_VOLUME_WITHIN = 0.05
+_MOST_TETS = 3e6  # a mesh that takes several GB and minutes to make, and is far too large for a solver
 _MAKERS = {"gmsh": "gmsh", "tetwild": "fTetWild"}
-_SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # factors on the requested number of triangles, tried in turn
+_SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # factors on the requested number of triangles, tried in this order
 
 
 def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] | None = None) -> TetMesh:
-    """Tetrahedra of edge length ``size`` [mm] that fill a closed, outward ``surface`` of m triangles. Tetrahedra by gmsh have
-    ``facets`` for each attachment; ``shares`` (m, 3) by attachment are the attached shares of triangle corners. ``maker`` names the
-    mesher. InputError if no mesher succeeds, and at once if ``size`` is far too small or too large.
+    """Fill a closed, outward ``surface`` with tetrahedra of edge length ``size`` [mm]. ``shares``: by name of an attachment, the
+    attached shares (m, 3) of the corners of the m triangles. A mesh from gmsh has ``facets`` for each attachment; ``maker`` names
+    the mesher. Raises InputError if no mesher succeeds, and at once if ``size`` is far too small or too large.
 
-    A surface finer than ``size`` is coarsened first, with edges along the rims of attachments. gmsh fills a surface without
-    self-intersections and keeps its triangles. The mesh is made in a frame spanned by the surface's vertices, so that it moves with
-    the surface. If gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (see its issue 72).
+    A surface finer than ``size`` is first coarsened, with edges along the rims of attachments. gmsh fills a surface without
+    self-intersections and keeps its triangles. The mesh is made in a frame defined by the vertices of the surface, so that it moves
+    with the surface. If gmsh fails, fTetWild makes its own mesh near the surface, a different one each time (see its issue 72).
     """
     origin, axes = _own_frame(surface.points)
-    local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
+    local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # "+ 0.0" removes negative zeros
     check_size(surface.moved_to(local), size)
     crossing = len(self_intersections(surface))
     if crossing:
@@ -65,9 +65,9 @@ def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] |
 
 
 def check_size(surface: Surface, size: float) -> None:
-    """Raise InputError if more than ``_MOST_TETS`` regular tets fill a surface, or ``size`` exceeds its smallest extent.
+    """Raise InputError if more than ``_MOST_TETS`` regular tets would fill a surface, or if its smallest extent is below ``size``.
 
-    The extent is measured in the frame of the vertices, so that rotating the surface changes nothing.
+    The extent is that along a coordinate axis; :func:`tetrahedralise` passes the surface in a frame that rotates with it.
     """
     volume, extent = enclosed_volume(surface.points, surface.triangles), np.ptp(surface.points, axis=0).min()
     if not volume <= _MOST_TETS * size**3 / (6 * np.sqrt(2)):
@@ -106,12 +106,12 @@ def _mesh(surface: Surface, size: float, shares: Mapping[str, Floats]) -> TetMes
             return replace(mesh, facets=_labelled(mesh, coarse, labels, list(shares)))
         except InputError as error:
             reason = str(error)
-    log.warning("%s: meshed by fTetWild, anew each time, as gmsh failed: %s", surface.place, reason)
+    log.warning("%s: meshed by fTetWild, differently each time, because gmsh failed: %s", surface.place, reason)
     return checked(run("tetwild", surface, size), surface)
 
 
 def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) -> dict[str, Ints]:
-    """The triangles of ``coarse`` with each label, by name; empty without rims, or if the mesh does not begin with its points."""
+    """Triangles of ``coarse`` with each label, by name; empty without rims, or if ``mesh`` does not begin with the same points."""
     count = len(coarse.points)
     if not labels.any() or not np.array_equal(mesh.points[:count], coarse.points):
         return {}
@@ -119,10 +119,10 @@ def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) ->
 
 
 def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> tuple[Surface, Ints]:
-    """The surface with edges along the rims of attachments, and the labels of its triangles, 0 if free. It has as many triangles as
-    equilateral triangles of side ``size`` would need to cover it; it is unchanged if it has fewer.
+    """Return the surface with edges along the rims of attachments, and the labels of its triangles, 0 if free. It has as many
+    triangles as equilateral triangles of side ``size`` are needed to cover it, and is unchanged if it has fewer.
 
-    If the coarse surface intersects itself, a few other counts are tried, and then a surface without rims.
+    If the coarse surface intersects itself, a few other numbers of triangles are tried, and finally a surface without rims.
     """
     count = triangle_areas(surface.points, surface.triangles).sum() / (size**2 * np.sqrt(3) / 4)
     fine = count >= len(surface.triangles)
@@ -141,7 +141,7 @@ def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> t
 
 
 def _near(coarse: Surface, surface: Surface, size: float) -> Surface:
-    """The ``coarse`` surface; InputError if it lacks a part of the ``surface``."""
+    """Return the ``coarse`` surface; InputError if a part of ``surface`` is missing from it."""
     lost = distances(surface.points, coarse).distance.max()
     log.info("%s: coarsened to %d triangles, at most %.2g mm off", surface.place, len(coarse.triangles), lost)
     if not lost <= size / 2:
@@ -151,7 +151,7 @@ def _near(coarse: Surface, surface: Surface, size: float) -> Surface:
 
 
 def run(mesher: str, surface: Surface, size: float) -> TetMesh:
-    """The tetrahedra of ``surface`` by ``mesher`` in a subprocess; InputError if it crashes or takes too long."""
+    """Fill ``surface`` with tetrahedra by ``mesher`` in a subprocess; InputError if it crashes or takes too long."""
     with subprocesses.scratch_folder() as folder:
         job, result = folder / "job.npz", folder / "result.npz"
         np.savez(job, mesher=mesher, points=surface.points, triangles=surface.triangles, size=size)
@@ -178,17 +178,17 @@ def run(mesher: str, surface: Surface, size: float) -> TetMesh:
 
 
 def last_words(done: subprocess.CompletedProcess[str]) -> str:
-    """The reason for the failure of a process: the signal that ended it, or its last line of output."""
+    """Reason for the failure of a process: the signal that ended it, or the last line of its error output."""
     if done.returncode < 0:
         return f"it crashed with signal {-done.returncode}"
     return (done.stderr.strip().splitlines() or ["no message"])[-1]
 
 
 def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
-    """The largest connected part of ``mesh``, its tets of positive volume, without unused points.
+    """Return the largest connected part of ``mesh``, with tets of positive volume and without unused points.
 
-    InputError if nothing is left, a tet is flat, or the volume of the tets is far from that in ``surface``. The boundary
-    of the tets is closed, as no triangle belongs to more than two tets.
+    Raises InputError if nothing remains, a tet is flat, or the volume of the tets is far from that of ``surface``. The boundary of
+    the tets is closed, as no triangle belongs to more than two tets.
     """
     if len(mesh.tets) == 0:
         raise InputError(surface.place, "no tetrahedra from the mesher", "a surface that bounds a body")
@@ -215,7 +215,7 @@ def _largest_part(tets: Ints, place: str) -> Ints:
 
 
 def _gmsh(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:
-    """Points and tets that fill a closed surface: its triangles are kept, its points come first, in their order."""
+    """Return points and tets that fill a closed surface. Its triangles are kept, and its points come first, in their order."""
     import gmsh
 
     gmsh.initialize()
@@ -240,7 +240,7 @@ def _gmsh(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:
 
 
 def _tetwild(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:
-    """Points and tets within a twentieth of ``size`` of a surface that may intersect itself."""
+    """Return points and tets whose boundary is within a twentieth of ``size`` of a surface, which may intersect itself."""
     import pytetwild
 
     near = size / 20 / diagonal(points)

@@ -1,6 +1,6 @@
-"""The shortest paths around several smooth obstacles: alternating straight pieces and geodesics, joined without kinks.
+"""Shortest paths around several smooth obstacles: straight pieces and geodesics in turn, joined without kinks.
 
-A taut string finds the obstacles that a path touches, and approximately where; Newton's method then finds the point, direction and
+A taut string shows approximately where a path touches which obstacles. Newton's method then finds the first point, direction and
 length of each geodesic for which all pieces join smoothly (Scholz et al. 2016, Multibody Syst. Dyn. 36, 195-219, DOI
 10.1007/s11044-015-9451-1). A path is a local minimum of length near the straight path, and touches each obstacle at most once.
 """
@@ -14,11 +14,13 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.obstacles import Quadric, SmoothSurface, Touch
 from fem_reference.geometry.taut_strings import MOST, Flags, halved, longest, met, taut, touching
 
-# Steps of a geodesic; the error at its end is about (length / radius)^5 / (120 _STEPS^4) of the radius, 1e-7 for half a turn.
+# The number of steps of a geodesic. The error at its end is about (length / radius)^5 / (120 _STEPS^4) times the radius, which is
+# 1e-7 for half a turn.
 _STEPS = 60
-# The limit on Newton iterations, their tolerance [fraction of the distance between the ends], and the finite-difference step.
+# The maximum number of Newton iterations; their tolerance, as a fraction of the distance between the ends plus the lengths of the
+# geodesics; and the finite-difference step.
 _ITERATIONS, _SMALL, _STEP = 40, 1e-11, 1e-6
-# Number of points at which a path is checked for crossing an obstacle, besides the deepest points of its chords.
+# The number of points at which a path is checked for crossing an obstacle, in addition to the deepest points of its chords.
 _CHECKED = 200
 
 
@@ -26,8 +28,8 @@ _CHECKED = 200
 class Winding:
     """n paths through K ``knots`` (n, K, 3) [mm], with unit ``tangents`` (n, K, 3) and arc lengths ``arcs`` (n, K) [mm].
 
-    The paths pass the obstacles ``met`` (n, m) in this order, each over the same number of knots; on a path with fewer than m
-    obstacles the remaining knots are at the end. ``failed`` (n,) is True if Newton's method found no path.
+    Each path passes the obstacles ``met`` (n, m) in this order, each with the same number of knots. If it passes fewer than m
+    obstacles, the remaining knots are at its end. ``failed`` (n,) is True where Newton's method found no path.
     """
 
     knots: Floats
@@ -38,7 +40,7 @@ class Winding:
 
     @classmethod
     def straight(cls, count: int, starts: Floats, ends: Floats) -> "Winding":
-        """Straight paths, with room for the knots of ``count`` obstacles."""
+        """Create straight paths that have enough knots for ``count`` obstacles."""
         away = np.linalg.norm(ends - starts, axis=1)
         along = (ends - starts) / np.where(away > 0, away, 1.0)[:, None]
         size = 2 + count * (_STEPS + 1)
@@ -47,7 +49,7 @@ class Winding:
         return cls(knots, tangents, arcs, np.zeros((len(starts), count), np.int64), np.zeros(len(starts), bool))
 
     def put(self, pattern: tuple[int, ...], which: Ints, pieces: "_Pieces", same: Ints) -> None:
-        """Store the rows ``same`` of ``pieces``, which are geodesics on the obstacles of a ``pattern``, as the paths ``which``."""
+        """Store rows ``same`` of ``pieces``, which are geodesics on the obstacles in ``pattern``, as the paths ``which``."""
         size = _STEPS + 1
         steps = np.zeros((len(which), self.knots.shape[1] - 1))
         for i, (points, tangents) in enumerate(pieces.run()):
@@ -69,11 +71,11 @@ class Winding:
         return self.arcs[:, -1]
 
     def directions(self) -> tuple[Floats, Floats]:
-        """Unit vectors (n, 3) along the paths at their starts and at their ends."""
+        """Return the unit vectors (n, 3) along the paths at their starts and at their ends."""
         return self.tangents[:, 0], self.tangents[:, -1]
 
     def touching(self) -> list[Touch]:
-        """The obstacles that paths touch, in order."""
+        """Return the contacts with the first, second, ... obstacle of each path."""
         size, found = _STEPS + 1, []
         for i in range(self.met.shape[1]):
             one, other = 1 + i * size, (i + 1) * size
@@ -82,7 +84,7 @@ class Winding:
         return found
 
     def at(self, which: Ints, shares: Floats) -> Floats:
-        """The points (m, 3) of paths ``which`` (m,) at the fractions ``shares`` (m,) of their lengths, by cubics between knots."""
+        """Points (m, 3) of the paths ``which`` (m,) at the fractions ``shares`` (m,) of their lengths, by cubics between knots."""
         wanted = shares * self.lengths[which]
         low = np.clip((self.arcs[which] <= wanted[:, None]).sum(axis=1) - 1, 0, self.arcs.shape[1] - 2)
         span = self.arcs[which, low + 1] - self.arcs[which, low]
@@ -95,8 +97,8 @@ class Winding:
 
 @dataclass(eq=False)
 class _Pieces:
-    """Geodesics on the m ``obstacles`` that n paths touch in this order: their first ``points``, their directions ``along`` there,
-    both (m, n, 3), and their lengths ``sizes`` (m, n) [mm].
+    """Geodesics on the m ``obstacles`` that n paths touch in this order. ``points`` (m, n, 3): their first points; ``along``
+    (m, n, 3): their directions there; ``sizes`` (m, n) [mm]: their lengths.
     """
 
     obstacles: list[SmoothSurface]
@@ -107,7 +109,7 @@ class _Pieces:
     sizes: Floats
 
     def run(self) -> list[tuple[Floats, Floats]]:
-        """Points and unit tangents (steps + 1, n, 3) of each geodesic."""
+        """Return the points and the unit tangents (steps + 1, n, 3) of each geodesic."""
         parts = zip(self.obstacles, self.points, self.along, self.sizes, strict=True)
         return [_geodesic(*part) for part in parts]
 
@@ -124,17 +126,17 @@ class _Pieces:
         return np.stack(found, axis=1)
 
     def rows(self, which: Ints) -> "_Pieces":
-        """The geodesics of the paths ``which``."""
+        """Return the geodesics of the paths ``which``."""
         parts = (values[:, which] for values in (self.points, self.along, self.sizes))
         return _Pieces(self.obstacles, self.starts[which], self.ends[which], *parts)
 
     def pressed(self) -> Flags:
-        """Mask (m, n), True where tension presses the path onto the obstacle: the surface is convex along the geodesic's middle."""
+        """Mask (m, n) of geodesics that tension presses onto the obstacle: the surface is convex along them at their midpoints."""
         middles = [(points[_STEPS // 2], tangents[_STEPS // 2]) for points, tangents in self.run()]
         return np.array([one.bending(*at) > 0 for one, at in zip(self.obstacles, middles, strict=True)])
 
     def moved(self, change: Floats) -> "_Pieces":
-        """The geodesics after changes (n, 4 m): of the start, along and across [mm], the direction [rad] and the length [mm]."""
+        """Change the geodesics by ``change`` (n, 4 m): the start, along and across [mm], the direction [rad], the length [mm]."""
         points, along, sizes = [], [], []
         for i, obstacle in enumerate(self.obstacles):
             ahead, aside, turn, longer = (change[:, 4 * i + k] for k in range(4))
@@ -150,9 +152,9 @@ class _Pieces:
         return _Pieces(self.obstacles, self.starts, self.ends, np.array(points), np.array(along), np.array(sizes))
 
 
-@np.errstate(all="ignore")  # NaN counts as failed
+@np.errstate(all="ignore")  # a path with NaN counts as failed
 def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Winding:
-    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``, which contain neither end."""
+    """Find the shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around ``obstacles``, which contain neither end."""
     string = taut(obstacles, starts, ends)
     turns = met(obstacles, string)
     found = Winding.straight(len(obstacles), starts, ends)
@@ -162,7 +164,7 @@ def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> 
         if not pattern:
             continue
         pieces, smooth = _solved(_guess([(j, obstacles[j]) for j in pattern], string[which]))
-        short = (pieces.sizes <= 0) | ~pieces.pressed()  # (m, n): the path does not meet the obstacle
+        short = (pieces.sizes <= 0) | ~pieces.pressed()  # (m, n): the path does not touch the obstacle
         for left_out in {tuple(column) for column in short.T.tolist()}:
             same = np.flatnonzero(np.all(np.array(left_out) == short.T, axis=1))
             if any(left_out):
@@ -176,7 +178,7 @@ def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> 
 
 
 def _wrong(obstacles: Sequence[SmoothSurface], found: Winding, string: Floats) -> Flags:
-    """Mask (n,) of the paths that cross an obstacle, or are longer than the string by more than 2 %, the error of its chords."""
+    """Mask (n,) of paths that cross an obstacle, or are more than 2 % longer than the string, whose chords are slightly short."""
     count = len(string)
     even = np.broadcast_to(np.linspace(0, 1, _CHECKED), (count, _CHECKED))
     shares = np.stack([*even.T, *(_deepest(one, found) for one in obstacles if isinstance(one, Quadric))], axis=1)
@@ -190,7 +192,7 @@ def _wrong(obstacles: Sequence[SmoothSurface], found: Winding, string: Floats) -
 
 
 def _deepest(obstacle: Quadric, found: Winding) -> Floats:
-    """The fractions (n,) of the paths' lengths at which their chords are deepest in an obstacle, even a small one."""
+    """Positions (n,), as fractions of the paths' lengths, at which their chords are deepest in an obstacle, even a small one."""
     begins, ends = found.knots[:, :-1], found.knots[:, 1:]
     at = obstacle.deepest(begins, ends)
     values = obstacle.level((begins + at[:, :, None] * (ends - begins)).reshape(-1, 3))[0].reshape(at.shape)
@@ -200,7 +202,7 @@ def _deepest(obstacle: Quadric, found: Winding) -> Floats:
 
 
 def _guess(met: list[tuple[int, SmoothSurface]], string: Floats) -> _Pieces:
-    """Geodesics near the parts of strings that touch the obstacles."""
+    """Geodesics near those parts of strings that touch the obstacles."""
     fine, points, along, sizes = halved(string), [], [], []
     for _, obstacle in met:
         flags = touching(obstacle, fine)
@@ -212,11 +214,11 @@ def _guess(met: list[tuple[int, SmoothSurface]], string: Floats) -> _Pieces:
         sizes.append(travelled[rows, last] - travelled[rows, first])
     found = (np.array(values) for values in (points, along, sizes))
     pieces = _Pieces([one for _, one in met], fine[:, 0], fine[:, -1], *found)
-    return pieces.moved(np.zeros((len(fine), 4 * len(met))))  # onto the surfaces
+    return pieces.moved(np.zeros((len(fine), 4 * len(met))))  # moves the geodesics onto the surfaces
 
 
 def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
-    """The geodesics after Newton's method has removed the kinks, and a mask (n,), True where it succeeded."""
+    """Remove the kinks by Newton's method; returns the geodesics and a mask (n,), True where it succeeded."""
     near = _SMALL * (np.linalg.norm(pieces.ends - pieces.starts, axis=1) + np.abs(pieces.sizes).sum(axis=0))
     most = np.array([[one.bend / 2, one.bend / 2, 0.5, one.bend] for one in pieces.obstacles]).ravel()
     todo, part, kinks = np.arange(len(near)), pieces, pieces.kinks()
@@ -228,7 +230,7 @@ def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
         count, size = kinks.shape
         every = part.rows(np.tile(np.arange(count), size)).moved(_STEP * np.repeat(np.eye(size), count, axis=0))
         slopes = (every.kinks().reshape(size, count, size) - kinks).transpose(1, 2, 0) / _STEP
-        slopes[~np.isfinite(slopes).all(axis=(1, 2))] = 0  # these paths remain unchanged, and fail
+        slopes[~np.isfinite(slopes).all(axis=(1, 2))] = 0  # these paths remain unchanged and fail
         change = -np.squeeze(np.linalg.pinv(slopes, rcond=1e-10) @ kinks[:, :, None], axis=2)
         change /= np.maximum(np.abs(change / most).max(axis=1), 1.0)[:, None]
         part, kinks = _better(part, change, np.linalg.norm(kinks, axis=1))
@@ -237,7 +239,7 @@ def _solved(pieces: _Pieces) -> tuple[_Pieces, Flags]:
 
 
 def _better(pieces: _Pieces, change: Floats, before: Floats) -> tuple[_Pieces, Floats]:
-    """The geodesics after a ``change`` (n, 4 m), halved while the kinks, ``before`` (n,) [mm], would grow; and their kinks."""
+    """Apply ``change`` (n, 4 m), halved while the kinks would exceed ``before`` (n,) [mm]; returns the geodesics and the kinks."""
     for _ in range(5):
         tried = pieces.moved(change)
         kinks = tried.kinks()
@@ -249,7 +251,7 @@ def _better(pieces: _Pieces, change: Floats, before: Floats) -> tuple[_Pieces, F
 
 
 def _geodesic(obstacle: SmoothSurface, points: Floats, along: Floats, sizes: Floats) -> tuple[Floats, Floats]:
-    """Points and unit tangents (steps + 1, n, 3) of geodesics of ``sizes`` (n,) from ``points`` ``along`` directions, (n, 3)."""
+    """Points and unit tangents (steps + 1, n, 3) of geodesics of ``sizes`` (n,) from ``points``, in the directions ``along``."""
     step, path = (sizes / _STEPS)[:, None], [(points, along)]
     half, bent = step / 2, obstacle.curving
     for _ in range(_STEPS):
@@ -266,7 +268,7 @@ def _geodesic(obstacle: SmoothSurface, points: Floats, along: Floats, sizes: Flo
 
 
 def _tangent(directions: Floats, slopes: Floats) -> Floats:
-    """Unit vectors (n, 3) along the parts of the ``directions`` perpendicular to the ``slopes``."""
+    """Unit vectors (n, 3) along the components of ``directions`` that are perpendicular to ``slopes``."""
     normals = _units(slopes)
     return _units(directions - np.vecdot(directions, normals)[:, None] * normals)
 

@@ -1,8 +1,8 @@
-"""The shortest paths between two points around a wrapping surface, a sphere or a cylinder: straight, geodesic, straight.
+"""Shortest paths between two points around a sphere or a cylinder: a straight piece, a geodesic and a straight piece.
 
-Along the surface a path is a geodesic: a great circle of the sphere, a helix of the cylinder. In a view along the axis of rotation,
-each is an arc of a circle between two tangents, so one closed form holds for both (the "obstacles" of Garner and Pandy 2000,
-Comput. Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/10255840008915251; report 5.3).
+On the surface a path is a geodesic: a great circle of the sphere or a helix of the cylinder. Seen along the axis of rotation, each
+is an arc of a circle between two tangents, so one closed form holds for both (the "obstacles" of Garner and Pandy 2000, Comput.
+Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/10255840008915251; report 5.3).
 """
 
 from dataclasses import dataclass
@@ -16,10 +16,11 @@ from fem_reference.geometry.obstacles import Quadric, Touch
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """n paths: ``parts`` (n, 3) [mm], their lengths before, along and after the surface; a straight path is entirely before it.
+    """n paths. ``parts`` (n, 3) [mm]: the lengths before, on and after the surface; a straight path lies entirely before it.
 
-    ``starts``, ``ends``, and ``touches``, the points where each meets and leaves the surface: (n, 3) [mm]. Along the surface a path
-    turns by ``turns`` (n,) [rad] about the unit ``axes`` (n, 3) through ``middles`` (n, 3) and climbs evenly along them.
+    ``starts``, ``ends``: the end points; ``touches``: the points where each path arrives at the surface and leaves it, all
+    (n, 3) [mm]. On the surface a path rotates by ``turns`` (n,) [rad] about the unit ``axes`` (n, 3) through ``middles`` (n, 3),
+    and advances uniformly along these axes.
     """
 
     parts: Floats
@@ -36,7 +37,7 @@ class Paths:
         return np.zeros(len(self.parts), dtype=bool)
 
     def touching(self) -> list[Touch]:
-        """The obstacle, as if paths met it at their starts and left it at their ends: the resultant force on it is the same."""
+        """Return the contact as if paths arrived at their starts and left at their ends, which gives the same resultant force."""
         first, last = self.directions()
         return [Touch(np.zeros(len(self.parts), dtype=np.int64), self.starts, first, self.ends, last)]
 
@@ -46,7 +47,7 @@ class Paths:
         return np.asarray(self.parts.sum(axis=1))
 
     def directions(self) -> tuple[Floats, Floats]:
-        """Unit vectors (n, 3) along the paths at their starts and at their ends; 0 for a path of length 0."""
+        """Return the unit vectors (n, 3) along the paths at their starts and at their ends; 0 for a path of length 0."""
         straight, wraps = self.ends - self.starts, self.parts[:, 1] > 0
         climb = _along(self.touches[1] - self.touches[0], self.axes)
         arms = (_across(touch - self.middles, self.axes) for touch in self.touches)
@@ -55,7 +56,7 @@ class Paths:
         return _units(first), _units(last)
 
     def at(self, which: Ints, shares: Floats) -> Floats:
-        """The points (m, 3) of paths ``which`` (m,) at the fractions ``shares`` (m,) of their lengths, from 0 to 1."""
+        """Points (m, 3) of the paths ``which`` (m,) at the fractions ``shares`` (m,) of their lengths, from 0 to 1."""
         before, along, behind = self.parts[which].T
         path = shares * (before + along + behind)
         on = _clipped(path - before, along)
@@ -65,7 +66,7 @@ class Paths:
         return np.where(beyond[:, None], last, np.where(wraps[:, None], self._on_surface(which, on), straight))
 
     def _on_surface(self, which: Ints, share: Floats) -> Floats:
-        """The points (m, 3) at the fraction ``share`` (m,) of the part of the path on the surface."""
+        """Points (m, 3) at the fraction ``share`` (m,) of the part of each path on the surface."""
         first, last, axes, middles = (values[which] for values in (*self.touches, self.axes, self.middles))
         height, climb = _along(first - middles, axes), share[:, None] * _along(last - first, axes)
         turned = _turned(first - middles - height, axes, share * self.turns[which])
@@ -73,8 +74,8 @@ class Paths:
 
 
 def around(obstacle: Quadric, starts: Floats, ends: Floats) -> Paths:
-    """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along a great circle through both
-    points, or around a cylinder, along a helix. Points inside count as on the surface.
+    """Compute the shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along a great circle through both
+    points, or around a cylinder, along a helix. Points inside the obstacle are treated as on its surface.
     """
     middle = obstacle.pose[:3, 3]
     if np.isfinite(obstacle.radii[2]):
@@ -88,18 +89,18 @@ def around(obstacle: Quadric, starts: Floats, ends: Floats) -> Paths:
 
 
 def straight(starts: Floats, ends: Floats) -> Paths:
-    """The straight lines from ``starts`` (n, 3) to ``ends`` (n, 3) [mm]."""
+    """Return straight paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm]."""
     parts = np.zeros((len(starts), 3))
     parts[:, 0] = np.linalg.norm(ends - starts, axis=1)
     return Paths(parts, starts, ends, (ends, ends), starts, np.zeros_like(starts), np.zeros(len(starts)))
 
 
 def _around(starts: Floats, ends: Floats, middle: Floats, axes: Floats, radius: float) -> Paths:
-    """The paths that turn from starts to ends, by at most half a turn, about ``axes`` (n, 3) through ``middle`` (3,).
+    """Compute paths that rotate from starts to ends, by at most half a turn, about ``axes`` (n, 3) through ``middle`` (3,).
 
-    In a view along the axis, points at distances d1, d2 from it and an angle t apart are joined by tangents of lengths
-    sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)). If this angle is not positive, the path is straight. The
-    displacement along the axis is distributed evenly over this length: unrolled, the path is a straight line.
+    Seen along the axis, two points at distances d1, d2 from it and at an angle t from each other are joined by tangents of the
+    lengths sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)). If the angle in brackets is not positive, the path is
+    straight. The displacement along the axis is distributed uniformly over this length: unrolled, the path is a straight line.
     """
     one, other = _across(starts - middle, axes), _across(ends - middle, axes)
     sines, cosines = np.sum(np.cross(one, other) * axes, axis=1), np.sum(one * other, axis=1)
@@ -125,28 +126,28 @@ def _around(starts: Floats, ends: Floats, middle: Floats, axes: Floats, radius: 
 
 
 def _turned(arms: Floats, axes: Floats, angles: Floats) -> Floats:
-    """The ``arms`` (n, 3), which are perpendicular to the unit ``axes``, turned about them by ``angles`` (n,)."""
+    """Rotate ``arms`` (n, 3), which are perpendicular to the unit ``axes``, about these axes by ``angles`` (n,)."""
     return np.asarray(np.cos(angles)[:, None] * arms + np.sin(angles)[:, None] * np.cross(axes, arms))
 
 
 def _units(vectors: Floats) -> Floats:
-    """Vectors (n, 3) of length 1 along ``vectors``, 0 for 0."""
+    """Unit vectors (n, 3) along ``vectors``, 0 for a zero vector."""
     sizes = np.linalg.norm(vectors, axis=1)[:, None]
     return np.asarray(vectors / np.where(sizes > 0, sizes, 1.0))
 
 
 def _along(vectors: Floats, axes: Floats) -> Floats:
-    """The part of ``vectors`` (n, 3) along the unit ``axes``, (3,) or (n, 3)."""
+    """Component of ``vectors`` (n, 3) along the unit ``axes``, (3,) or (n, 3)."""
     return np.asarray(np.sum(vectors * axes, axis=1)[:, None] * axes)
 
 
 def _across(vectors: Floats, axes: Floats) -> Floats:
-    """The part of ``vectors`` (n, 3) perpendicular to the unit ``axes``, (3,) or (n, 3)."""
+    """Component of ``vectors`` (n, 3) perpendicular to the unit ``axes``, (3,) or (n, 3)."""
     return np.asarray(vectors - _along(vectors, axes))
 
 
 def _perpendicular(normals: Floats, arms: Floats) -> Floats:
-    """``normals`` (n, 3) scaled to length 1; for a normal that is only round-off, some direction perpendicular to its arm."""
+    """Scale ``normals`` (n, 3) to length 1; if a normal is only round-off, use any direction perpendicular to its arm."""
     sizes = np.linalg.norm(normals, axis=1)[:, None]
     squares = np.sum(arms**2, axis=1)[:, None]
     spare = np.cross(arms, np.eye(3)[np.argmin(np.abs(arms), axis=1)])
@@ -154,7 +155,7 @@ def _perpendicular(normals: Floats, arms: Floats) -> Floats:
 
 
 def _clipped(path: Floats, length: Floats) -> Floats:
-    """``path`` as a fraction of ``length``, from 0 to 1; 0 if there is no length."""
+    """Return ``path`` as a fraction of ``length``, from 0 to 1; 0 if the length is 0."""
     return np.clip(path / np.where(length > 0, length, 1.0), 0.0, 1.0)
 
 

@@ -95,3 +95,18 @@ def test_what_is_made_once_is_made_by_one_thread_at_a_time() -> None:
     assert [line.split()[0] for line in making[::2]] == [line.split()[0] for line in making[1::2]]
     assert parts["a"]() == "a"
     assert len(making) == 6
+
+
+def test_a_thread_that_waited_for_another_gets_the_same_result() -> None:
+    """Both ask before the result exists, so a cache that is read before the lock would compute it twice."""
+    both, made = threading.Barrier(2, timeout=10), list[object]()
+
+    def make() -> object:
+        time.sleep(0.05)
+        made.append(object())
+        return made[-1]
+
+    once = made_once(make)
+    one, other = in_threads(lambda _, __: (both.wait(), once())[1], range(2), 2 * [nullcontext])
+    assert one is other is once() is made[0]
+    assert len(made) == 1

@@ -1,16 +1,21 @@
 """Tetrahedra that were made before are read, as they were made; whatever they depend on makes others."""
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import shapes
 
+from fem_reference.foundations import mesh, rows
 from fem_reference.foundations.mesh import Surface, TetMesh
 from fem_reference.geometry import kept_meshes
 from fem_reference.geometry.kept_meshes import cached, kept
 
+_TEXT: Any = {"check": True, "capture_output": True, "text": True}
 BOX = shapes.skin(shapes.box((2, 2, 2), (10, 10, 10)))
 SHARES = {"top": np.ones((len(BOX.triangles), 3))}
 
@@ -67,7 +72,7 @@ def test_a_damaged_file_is_made_anew_and_a_folder_that_cannot_be_is_no_reason_to
     path.write_bytes(path.read_bytes()[:100])
     assert cached(mesher, BOX, 3.0, SHARES, tmp_path).maker == "gmsh"
     assert mesher.count == 2
-    assert "damaged and are made again" in caplog.text
+    assert "damaged and are computed again" in caplog.text
     (tmp_path / "file").write_text("")
     assert cached(mesher, BOX, 3.0, SHARES, tmp_path / "file" / "kept").maker == "gmsh"
     assert "were not stored" in caplog.text
@@ -105,7 +110,7 @@ def test_a_damaged_file_is_made_anew(data, asked, tmp_path: Path, caplog) -> Non
     assert call(path).tobytes() == VALUES.tobytes()
     assert call(path).tobytes() == VALUES.tobytes()
     assert made == [0, 1]
-    assert f"{path}: the stored arrays are damaged and are made again" in caplog.text
+    assert f"{path}: the stored arrays are damaged and are computed again" in caplog.text
 
 
 def test_arrays_that_are_programs_are_not_run(asked, tmp_path: Path, caplog) -> None:
@@ -122,3 +127,14 @@ def test_a_place_that_cannot_be_written_is_no_reason_to_fail(asked, tmp_path: Pa
     assert call(tmp_path / "file" / "b.npz") is VALUES
     assert made == [0]
     assert "were not stored" in caplog.text
+
+
+def test_all_code_that_makes_meshes_and_distances_is_part_of_their_keys() -> None:
+    """Every module of ours that a module of geometry loads, itself or by another: only that which writes files is left out."""
+    code = "import pkgutil, importlib, sys, fem_reference.geometry as g; "
+    code += "[importlib.import_module(f'{g.__name__}.{one.name}') for one in pkgutil.iter_modules(g.__path__)]; "
+    code += "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('fem_reference.') and m.__file__), sep='\\n')"
+    loaded = {Path(line) for line in subprocess.run([sys.executable, "-c", code], **_TEXT).stdout.split()}
+    missing = {str(path.relative_to(Path(mesh.__file__).parents[1])) for path in loaded - set(kept_meshes.sources())}
+    assert {name for name in missing if not name.startswith("io/")} == set()
+    assert {Path(mesh.__file__), Path(rows.__file__), Path(kept_meshes.__file__)} <= loaded

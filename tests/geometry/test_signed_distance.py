@@ -281,7 +281,7 @@ def test_damaged_files_are_made_anew(counted: list[float], tmp_path: Path, caplo
     path.write_bytes({"cut": whole[:-300], "empty": b"", "text": b"not a grid", "bit": bytes(flipped)}[damage])
     again = cached(BALL, 0.1, 2.0, 0.0, tmp_path)
     assert len(counted) == 2
-    assert "damaged and are made again" in caplog.text
+    assert "damaged and are computed again" in caplog.text
     cached(BALL, 0.1, 2.0, 0.0, tmp_path)
     assert len(counted) == 2
     assert np.isfinite(again.coefficients).all()

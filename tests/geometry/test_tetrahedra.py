@@ -148,7 +148,10 @@ def test_a_surface_through_itself_is_meshed_by_the_other_mesher(caplog: pytest.L
     assert len(self_intersections(dirty)) > 0
     with caplog.at_level(logging.WARNING):
         mesh = tetrahedralise(dirty, 16.0, {"all": np.ones(dirty.triangles.shape)})
-    assert "dirty.ply: meshed by fTetWild, anew each time, as gmsh failed: 12 triangles pass through" in caplog.text
+    assert (
+        "dirty.ply: meshed by fTetWild, differently each time, because gmsh failed: 12 triangles pass through"
+        in caplog.text
+    )
     assert "dirty.ply: 12 triangles of the given surface intersect others" in caplog.text
     assert mesh.maker == "fTetWild"
     assert mesh.facets == {}
