@@ -154,10 +154,8 @@ def penetration(run: Followed) -> Found:
 
 
 def passed(run: Followed) -> Found:
-    """The maximum depth inside a bone that a free vertex reaches on its way from the last frame, in per cent of the size of the
-    body.
-
-    The way is a straight line relative to the bone. This detects a bone that crosses the body and is outside it in both frames.
+    """The maximum depth inside a bone that a free vertex reaches on its path from the previous frame, in per cent of the body's
+    size. The path is straight, relative to the bone. This detects a bone that crosses the body and is outside it in both frames.
     """
     depths = np.zeros(run.positions.shape[:2])
     for bone in run.bones:

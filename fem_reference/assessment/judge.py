@@ -52,7 +52,7 @@ class Verdict:
 
 
 def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> Word:
-    """Judge whether a ``value`` is ``within`` a tolerance of the ``truth``, which is known to within its ``error_bar``; all in one
+    """Judge whether a ``value`` is at most ``within`` from the ``truth``, which is known up to its ``error_bar``. All four have one
     unit.
 
     The verdict is pass if ``abs(value - truth) <= within`` for every truth in the error bar, fail if this holds for no such truth,
