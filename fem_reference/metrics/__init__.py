@@ -265,8 +265,9 @@ def at_rest(run: Run) -> Run:
 
 
 def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
-    """All statistics of the change from rest of a ``run`` by the reference's solver, on the fibres of this run. The fibres of two
-    runs differ at rest if overlaps with bones are removed first; the surface would have to carry the fibres of another run.
+    """All statistics of the change from rest of a ``run`` by the reference's solver, measured on the fibres of this run: if
+    overlaps with bones are removed first, the fibres of two runs differ at rest, and a surface would have to carry the fibres of
+    another run.
     """
     own = context if run.fibres is None else replace(context, fibres=run.fibres)
     return measure(run, at_rest(run), own, wanted)

@@ -121,8 +121,8 @@ def _deepest(exempt: Exemption, fine: Surface, bone: str, gaps: Floats, allowed:
 
 
 def _allowed(exempt: Exemption, bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> dict[str, Floats]:
-    """By bone, the allowed depth (k,) [mm] at the corners of the pieces of a surface. It is 0 where contact acts, the depth at rest
-    near attachments, and infinite on attachments to this bone or to a bone that moves in the same way in all frames ``numbers``.
+    """The allowed depth (k,) [mm] at the corners of the pieces of a surface, by bone: 0 where contact acts, the depth at rest near
+    attachments, and infinite on attachments to this bone or to a bone that moves in the same way in all frames ``numbers``.
     """
     near, on = exempt.corners.away <= exempt.reach, exempt.corners.away == 0
     rest = exempt.corners.carried @ exempt.surface.points
