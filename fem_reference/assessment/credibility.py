@@ -21,12 +21,7 @@ from fem_reference.foundations.records import Record, parse
 FILE = Path(__file__).with_suffix(".toml")
 _ROUNDED = 0.5  # the rounding of a percentage published without decimals
 _WHOLE = 100.0  # per cent of all poses
-_READ = (
-    "publication",
-    "abstract",
-    "quotation",
-    "memory",
-)  # kinds of text in which numbers were read, the most reliable first
+_READ = ("publication", "abstract", "quotation", "memory")  # kinds of text in which numbers were read, best first
 # "outside": the model differs from at least one measurement by more than its uncertainty, even if it agrees with others.
 Grade = Literal["validated", "indicative", "outside", "verified only", "not compared"]
 

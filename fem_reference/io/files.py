@@ -1,5 +1,6 @@
-"""Reading and writing of surfaces, polylines and tetrahedra in common mesh formats. Files are written completely or not at all. A
-reader keeps the order and the number of the points and, if the file has double precision, their precision.
+"""Reading and writing of surfaces, polylines and tetrahedra in common mesh formats. Files are written completely or not at all.
+
+A reader keeps the order and the number of the points and, if the file has double precision, their precision.
 """
 
 import csv

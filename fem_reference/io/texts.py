@@ -1,5 +1,6 @@
-"""TOML, JSON and XML from untrusted files, with bounds on size and depth, so that reading always ends. A file is rejected if it
-cannot be parsed, is too large, is nested too deeply, or refers to files outside its folder.
+"""TOML, JSON and XML from untrusted files, with bounds on size and depth, so that reading always ends.
+
+A file is rejected if it cannot be parsed, is too large, is nested too deeply, or refers to files outside its folder.
 """
 
 import json

@@ -1,5 +1,6 @@
-"""Dihedral angles at the edges of a run's surface, compared with the reference. Relative to rest, the mean magnitude is the
-dihedral angle change of the report (eq. 5.23, Figs 6.18 to 6.20).
+"""Dihedral angles at the edges of a run's surface, compared with the reference.
+
+Relative to rest, the mean magnitude is the dihedral angle change of the report (eq. 5.23, Figs 6.18 to 6.20).
 """
 
 import numpy as np

@@ -1,5 +1,6 @@
-"""Depth and volume of a run's muscle inside the bones, independent of the reference. The distance field is the same as for contact.
-Where the surface is exempt from contact, only the depth added since rest counts.
+"""Depth and volume of a run's muscle inside the bones, independent of the reference.
+
+The distance field is the same as for contact. Where the surface is exempt from contact, only the depth added since rest counts.
 """
 
 import logging

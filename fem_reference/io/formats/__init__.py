@@ -1,5 +1,7 @@
-"""Formats of surface meshes: one module for each, found automatically in this folder. Each module defines ``FORMAT``. Contract
-(tests/contracts/test_every_format.py): a surface that is written is read back bit for bit, and a truncated file is rejected.
+"""Formats of surface meshes: one module for each, found automatically in this folder.
+
+Each module defines ``FORMAT``. Contract (tests/contracts/test_every_format.py): a surface that is written is read back bit for bit,
+and a truncated file is rejected.
 """
 
 import importlib

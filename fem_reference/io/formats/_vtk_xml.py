@@ -1,5 +1,6 @@
-"""VTK's XML formats, read with numpy alone. No array is larger than the number of bytes in the file allows. VTK's own readers are
-native code that trusts the file: a wrong number in a file can crash or hang the process.
+"""VTK's XML formats, read with numpy alone. No array is larger than the number of bytes in the file allows.
+
+VTK's own readers are native code that trusts the file: a wrong number in a file can crash or hang the process.
 """
 
 import base64
@@ -143,7 +144,7 @@ def _of_lz4(packed: bytes, wanted: int) -> bytes:
     import pyvista
     from vtkmodules.vtkIOCore import vtkLZ4DataCompressor
 
-    found = bytearray(min(wanted, 256 * len(packed)))  # a byte of LZ4 expands to at most 255 bytes bytes
+    found = bytearray(min(wanted, 256 * len(packed)))  # a byte of LZ4 expands to at most 255 bytes
     with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False):
         return bytes(found[: vtkLZ4DataCompressor().Uncompress(packed, len(packed), found, len(found))])
 

@@ -40,10 +40,7 @@ def read_mesh(path: Path) -> Any:
     from meshio.gmsh.main import read_buffer
 
     _check_declared(path.read_bytes())
-    with (
-        redirect_stderr(io.StringIO()),
-        _Ending(io.FileIO(path)) as file,
-    ):  # meshio prints messages about cells that it skips
+    with redirect_stderr(io.StringIO()), _Ending(io.FileIO(path)) as file:  # meshio prints what it skips
         return read_buffer(file)
 
 
