@@ -114,7 +114,9 @@ def read(path: Path, case: MuscleCase, candidate: str) -> Baseline:
         raise InputError(f"{path}: scene", got, want)
     if baseline.frames != case.numbers:
         raise InputError(
-            f"{path}: frames", f"{len(baseline.frames)} numbers that differ from the scene's", "its frame numbers"
+            f"{path}: frames",
+            f"{len(baseline.frames)} frame numbers that differ from the scene's",
+            "the scene's frame numbers",
         )
     return baseline
 

@@ -126,7 +126,7 @@ class Entry:
 
 def _finding(found: float | Finding | None) -> Finding:
     if found is None:
-        return Finding(math.nan, note="it measured no value")
+        return Finding(math.nan, note="no value was measured")
     return found if isinstance(found, Finding) else Finding(found)
 
 

@@ -25,7 +25,7 @@ from fem_reference.scenes.case import Case, Expectation
 @dataclass(frozen=True)
 class Convergence:
     """The convergence of an ``element`` on meshes whose size is halved from each mesh to the next: the ``cells`` and ``errors`` of
-    each mesh, and the ``order`` of convergence on the two finest meshes, NaN if the errors are only rounding.
+    each mesh, and the ``order`` of convergence on the two finest meshes, NaN if the errors are only rounding errors.
 
     ``against``: the definition of the error, in words: the L2 distance to the exact solution, or the rms distance at the vertices
     from the finest solution of order 2.

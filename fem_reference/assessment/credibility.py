@@ -19,8 +19,8 @@ from fem_reference.assessment.moment_arms import ArmsBeside
 from fem_reference.foundations.records import Record, parse
 
 FILE = Path(__file__).with_suffix(".toml")
-_ROUNDED = 0.5  # the rounding of a percentage published without decimals
-_WHOLE = 100.0  # per cent of all poses
+_ROUNDED = 0.5  # the rounding error of a percentage published without decimals
+_WHOLE = 100.0  # [%], all poses
 _READ = ("publication", "abstract", "quotation", "memory")  # kinds of text in which numbers were read, best first
 # "outside": the model differs from at least one measurement by more than its uncertainty, even if it agrees with others.
 Grade = Literal["validated", "indicative", "outside", "verified only", "not compared"]
@@ -31,8 +31,9 @@ class Evidence(Record):
 
     ``verified``: the groups of the catalogue that verify it. ``closed_forms``, ``other_codes`` and ``bar``: closed forms,
     comparisons with other codes and the numerical error bar, in words. ``band``: the name of the facts on differences between
-    models and real muscles; ``band_of``: these models, in words. ``experiments``: the experiments with which the quantity is
-    compared, and ``compared``: these comparisons, in words. ``arms``: True if moment arms are compared with published moment arms.
+    models and real muscles; ``band_of``: a description of these differences. ``experiments``: the experiments with which the
+    quantity is compared; ``compared``: a description of these comparisons. ``arms``: True if moment arms are compared with
+    published moment arms.
     """
 
     name: str
@@ -170,8 +171,8 @@ def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result]
 
 
 def of_result(found: Result) -> Beside:
-    """The comparison in a measured catalogue entry of the kind "experiment". It validates only if all its facts validate and no
-    part of its model is recalled from memory.
+    """The comparison that a measured catalogue entry of the kind "experiment" makes. It validates only if all its facts validate
+    and no part of its model is recalled from memory.
     """
     entry = found.entry
     facts = entry.facts

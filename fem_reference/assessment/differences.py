@@ -10,7 +10,7 @@ from fem_reference.runs.store import Run
 
 # Prefixes of statistics that are the value at a single point, each with the prefix of the corresponding average over points.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
-_LEAST = 0.5  # the minimum difference between averages of changes, as a fraction of the runs' distance; less is due to chance
+_LEAST = 0.5  # averages of changes differ by at least this fraction of the distance of the runs; less is due to chance
 _MOVED = 0.01  # if a surface has moved by less than this fraction of its maximum motion, ratios to the motion have no meaning
 
 
@@ -21,7 +21,7 @@ def greatest(values: Floats) -> float:
 
 
 def ratio(differences: Floats, scale: Floats) -> float:
-    """The rms of ``differences`` (f,) divided by the rms of ``scale`` (f,), over the frames with both; NaN if the scale is 0."""
+    """The rms of ``differences`` (f,) divided by the rms of ``scale`` (f,), over frames with both values; NaN for a scale of 0."""
     known = np.isfinite(differences) & np.isfinite(scale)
     squares = float(scale[known] @ scale[known])
     return math.sqrt(float(differences[known] @ differences[known]) / squares) if squares > 0 else math.nan

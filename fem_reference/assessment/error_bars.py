@@ -177,7 +177,7 @@ def _model(one: Measure, exact: Floats | None, own: Floats | None) -> Floats | N
 
 
 def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Floats | None = None) -> _Differences:
-    """The typical sizes of the ``differences`` of ``statistics`` between two runs, whose surfaces have ``moved`` (f,) [mm]."""
+    """The typical sizes of ``differences`` between two runs, by statistic. ``moved`` (f,) [mm]: the motion of the surfaces."""
     apart = _rms_of_surface(statistics, differences["deviation"])
     deviations = [typical(found, apart, moved) for found in differences["deviation"]]
     kinds = [(one.metric, one.statistic) for one in statistics]

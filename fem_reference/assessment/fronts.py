@@ -31,7 +31,7 @@ LOAD, LOADED = "load_by_others", 0.1
 TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
 # The type of an error, a bar or a cost.
 Amount = Annotated[float, Field(ge=0, le=1e15, allow_inf_nan=False)]
-# A slope is computed only from at least this many points, whose errors must span this factor.
+# A slope is computed only from at least this many points, whose errors must span more than this factor.
 _LEAST_POINTS, _LEAST_SPAN = 2, 1.3
 
 

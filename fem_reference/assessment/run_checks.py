@@ -162,7 +162,7 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
 
 
 def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
-    """For exact attachments, the distance of vertices from their positions on the bone: a strain times their distance from attached
+    """The distance of exactly attached vertices from their positions on the bone: a strain times their distance from attached
     facets is allowed. For springs, the mean extension: force (in situ, plus that at rest) over stiffness and area is allowed.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)

@@ -168,8 +168,10 @@ class Uncertainty:
 
 
 def place(candidate: str, band: Band, values: Floats) -> Placed:
-    """Compare the ``values`` (f,) of a candidate with a band. The candidate is inside or outside if it is so by more than the error
-    bar of the reference, otherwise undecided; without a bar it is undecided too. A value that is not finite has "no answer".
+    """Compare the ``values`` (f,) of a candidate with a band.
+
+    A value is inside or outside the band if its distance from the end of the band exceeds the error bar of the reference, otherwise
+    undecided. Without a bar it is undecided too. A value that is not finite has "no answer".
     """
     bar = np.full(len(values), math.nan) if band.bar is None else band.bar
     above, below = band.high - values, math.inf if band.distance else values - band.low

@@ -46,7 +46,8 @@ def _format(path: Path, want: str, known: Collection[str]) -> Format:
 
 
 def read_surface(path: Path, unit: float) -> Surface:
-    """The triangles in a file whose coordinates are in units of ``unit`` mm, with the path as the ``place`` of the surface.
+    """The triangles in a file, with the path as the ``place`` of the surface. ``unit``: the unit of the coordinates in the file, in
+    mm.
 
     A surface from an STL file has three points for each triangle, because the file has no shared points. Raises InputError if the
     file cannot be read completely, or has polygons other than triangles.
@@ -60,8 +61,8 @@ def read_surface(path: Path, unit: float) -> Surface:
 def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) -> Surface:
     """The boundary of those tetrahedra in a VTU or MSH file whose value in an ``array`` of the cells is one of ``labels``.
 
-    For gmsh the array is ``gmsh:physical``. Coordinates are in units of ``unit`` mm. Raises InputError if the file lacks the array,
-    or has none of the labels.
+    For gmsh the array is ``gmsh:physical``. ``unit``: the unit of the coordinates in the file, in mm. Raises InputError if the file
+    lacks the array, or has none of the labels.
     """
     want = (
         f'tetrahedra with an array "{array}" of integers, some of them {", ".join(map(str, labels))}, as .vtu or .msh'
@@ -86,11 +87,10 @@ def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) 
 
 
 def read_polylines(path: Path, unit: float, *, moved: bool = False) -> Polylines:
-    """The lines in a VTK or VTP file whose coordinates are in units of ``unit`` mm. Cells that begin at the end of another cell are
-    joined to it.
+    """The lines in a VTK or VTP file. Cells that begin at the end of another cell are joined to it.
 
-    ``moved``: True for lines of a moved state. In a state at rest, points that are not finite and lines without length are errors
-    too. Raises InputError if the file cannot be read completely.
+    ``unit``: the unit of the coordinates in the file, in mm. ``moved``: True for lines of a moved state. In a state at rest, points
+    that are not finite and lines without length are errors too. Raises InputError if the file cannot be read completely.
     """
     want = f"complete polylines as {' or '.join(vtk.LINES)}"
     _format(path, want, vtk.LINES)
@@ -105,8 +105,8 @@ def read_points(path: Path) -> Floats:
 
 
 def read_xdmf(path: Path, unit: float) -> list[tuple[float, Surface]]:
-    """The time and the surface of each step of a temporal collection, whose coordinates are in units of ``unit`` mm. The points are
-    moved by the point data named ``displacement`` or ``u``.
+    """The time and the surface of each step of a temporal collection. ``unit``: the unit of the coordinates in the file, in mm. The
+    points are moved by the point data named ``displacement`` or ``u``.
     """
     want = "an XDMF time series of one triangle mesh with its displacement"
     steps = _attempt(xdmf.read, path, want)

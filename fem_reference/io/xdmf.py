@@ -51,7 +51,7 @@ def _check(item: Element, path: Path) -> None:
 
 
 def _check_dataset(file: Any, place: str) -> None:
-    """Raise ValueError if the dataset at ``place`` in an HDF5 file is stored outside this file, is too large, or has no numbers."""
+    """Raise ValueError if the dataset at ``place`` in an HDF5 file is not numeric, is stored outside this file, or is too large."""
     import h5py
 
     names = ["", *place.strip("/").split("/")]

@@ -1,8 +1,9 @@
 """Distances of the ends of fibres from their positions on moving bones, in the run alone, independent of the reference.
 
-The end of a fibre at an attachment moves with its bone. A fibre from a file may end near the attached area without reaching it; it
-does not follow the bone, and differs in length and moment arm from fibres that reach the area. In a run without fibres, points that
-its surface carries are measured. :func:`fem_reference.problems.fibre_ends.attached_ends` gives the attachment of an end.
+The end of a fibre at an attachment moves with its bone. A fibre from a file may end near the attached area without reaching it.
+Such a fibre does not follow the bone, and differs in length and moment arm from fibres that reach the area. In a run without
+fibres, points that its surface carries are measured. :func:`fem_reference.problems.fibre_ends.attached_ends` gives the attachment
+of an end.
 """
 
 import numpy as np

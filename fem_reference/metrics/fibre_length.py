@@ -33,7 +33,7 @@ STATISTICS = {
     "max_percent": _of_lines("%", _TITLE, "worst fibre", shown={"table": 30, "claim": 60}, lone=True),
 }
 OF, AGAINST = "lines", "reference"
-# Fibre points within this distance [mm] of the points of the measurement context count as the same points, in single precision.
+# Fibre points within this distance [mm] of the points of the measurement context are the same points, stored in single precision.
 _SAME = 1e-3
 # The same distance for a run of lines alone: a reference may begin this far from rest if overlaps with bones were removed.
 _RELAXED = 5.0
@@ -72,7 +72,8 @@ def fibre_points(run: Run, context: MeasurementContext) -> Floats:
 
 @np.errstate(over="ignore", invalid="ignore")
 def extension_error(reference: Run, context: MeasurementContext) -> Measure:
-    """The maximum error [mm], over the fibres, of lengths by the extension, measured on the surface of the reference itself.
+    """The maximum error [mm], over the fibres, of lengths computed by the extension, measured on the surface of the reference
+    itself.
 
     The error is the length by the extension minus the length in the interior; NaN if the reference does not carry the fibres of the
     measurement context.

@@ -1,5 +1,7 @@
-"""Distance between a run's surface and the reference's surface: material (same vertex) and geometric (closest point). A surface
-that slides along itself deviates materially but not geometrically. All means are weighted by the area around each vertex at rest.
+"""Distance between a run's surface and the reference's surface: material (same vertex) and geometric (closest point).
+
+A surface that slides along itself deviates materially but not geometrically. All means are weighted by the area around each vertex
+at rest.
 """
 
 import numpy as np
