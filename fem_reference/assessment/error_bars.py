@@ -107,9 +107,9 @@ class ErrorBars:
 class Pair:
     """Runs of the reference over the same frames: ``fine`` is the reference itself, ``coarse`` has larger tetrahedra.
 
-    ``varied``: by name of a source of error, a run like ``coarse`` with this source halved. ``exact``: a run like ``coarse`` with
-    exact attachments instead of springs. ``sizes`` [mm]: the sizes of the tetrahedra in ``fine`` and ``coarse``. ``safety``: the
-    ratio of bars to the expected error. ``springs``: True if any attachment is by springs.
+    ``varied``: for each source of error, by name, a run like ``coarse`` with this source halved. ``exact``: a run like ``coarse``
+    with exact attachments instead of springs. ``sizes`` [mm]: the sizes of the tetrahedra in ``fine`` and ``coarse``. ``safety``:
+    the ratio of bars to the expected error. ``springs``: True if any attachment is by springs.
     """
 
     fine: Run
@@ -251,7 +251,7 @@ class BodyBars:
     """Error bars of a body at ``frames`` (f,): distances from its states in the limit of fine cells, NaN if unknown.
 
     ``points`` (f, n) [mm]: bars of the positions. ``energy`` (f,) [N mm]: bars of the energy. ``forces`` (f,) [N] and ``moments``
-    (f,) [N mm]: by name of each constraint or bone, the magnitude of the bar of the vector. ``displacement`` (f,): the bar of the
+    (f,) [N mm]: for each constraint or bone, by name, the magnitude of the bar of the vector. ``displacement`` (f,): the bar of the
     displacement divided by the displacement, both rms over the nodes. ``sharper``: the more accurate solution, in words.
     """
 

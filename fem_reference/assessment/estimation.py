@@ -72,9 +72,9 @@ class DecompositionError:
 
 @dataclass(frozen=True)
 class RodError:
-    """The error of a muscle made of ``rods`` of one ``radius`` [mm] along its fibres, which together have the volume of the muscle,
-    as in ``viper`` at rest. ``filled``: the fraction of the muscle that is filled. ``outside`` and ``overlap``: the fractions of
-    the rods that lie outside the muscle and that overlap.
+    """The error of representing a muscle by ``rods`` of one ``radius`` [mm] along its fibres, which together have the volume of the
+    muscle, as in ``viper`` at rest. ``filled``: the fraction of the muscle that is filled. ``outside`` and ``overlap``: the
+    fractions of the rods that lie outside the muscle and that overlap.
     """
 
     case: str

@@ -30,8 +30,8 @@ def force_bars(pair: Pair, context: MeasurementContext) -> tuple[ErrorBar, ...]:
                 size = _length(kind, bone, *runs)
                 parts[name] = left[name] * typical(size, apart[name], moved if name == TETRAHEDRA else None)
             bar = together(parts, np.ones(len(moved), bool))
-            # The change if springs of this muscle are distributed differently, and the change with exact attachments of this muscle
-            # or of a neighbour.
+            # The change if the springs of this muscle are distributed differently, and the change with exact attachments of this
+            # muscle or of a neighbour.
             known = [SPREAD * _length(kind, bone, pair.fine)] if pair.springs else []
             known += [] if pair.exact is None else [_length(kind, bone, pair.exact, pair.coarse)]
             model = np.maximum.reduce(known) if known else None

@@ -52,8 +52,7 @@ class Verdict:
 
 
 def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> Word:
-    """Judge whether a ``value`` is at most ``within`` from the ``truth``, which is known up to its ``error_bar``. All four have one
-    unit.
+    """Judge whether a ``value`` is at most ``within`` from the ``truth``, which is known up to its ``error_bar``; all in one unit.
 
     The verdict is pass if ``abs(value - truth) <= within`` for every truth in the error bar, fail if this holds for no such truth,
     otherwise inconclusive. A value that is not a number fails. If the truth, the tolerance or the bar is unknown, the verdict is
@@ -77,7 +76,7 @@ def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> 
 
 
 def overall(words: Iterable[Word]) -> Word:
-    """The overall verdict: the first of fail, inconclusive, doubtful pass and pass among the ``words``; not judged without any."""
+    """The overall verdict: the first of fail, inconclusive, doubtful pass and pass among the ``words``; otherwise not judged."""
     found = set(words)
     order: tuple[Word, ...] = ("fail", "inconclusive", "doubtful pass", "pass")
     return next((word for word in order if word in found), "not judged")

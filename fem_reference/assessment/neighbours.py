@@ -71,7 +71,7 @@ def _curved(mesh: TetMesh, displacement: Floats) -> Surface:
 
 
 def depths(runs: Mapping[str, Run]) -> Iterator[tuple[str, str, Floats]]:
-    """The two names and the depth (f,) [mm] of overlap of each pair of muscles in ``runs``; NaN where a position is not finite."""
+    """Both names and the depth of overlap (f,) [mm] for each pair of muscles in ``runs``; NaN where a position is not finite."""
     for one, other in combinations(runs, 2):
         found = list[float]()
         for a, b in zip(runs[one].positions, runs[other].positions, strict=True):

@@ -1,4 +1,4 @@
-"""Omissions of effects of a scene or of features of a solver: their changes, in error bars, and the time that they save."""
+"""Omissions of effects of a scene or features of a solver: the changes that they cause, and the time that they save."""
 
 import math
 from collections.abc import Mapping
@@ -98,8 +98,7 @@ def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str
 
 
 def verdict(changes: Mapping[str, float], bars: Mapping[str, float]) -> Word:
-    """Judge an omission: it matters if one of its ``changes`` exceeds the error bar, and does not if all are below a tenth of their
-    bars.
+    """Judge an omission: it matters if one of its ``changes`` exceeds its error bar, and does not if all are below a tenth.
 
     >>> bars = {"volume.deviation": 0.1, "surface_deviation.rms": 1.0}
     >>> [verdict({"volume.deviation": 0.005, "surface_deviation.rms": x}, bars) for x in (0.05, 0.5, 5.0)]

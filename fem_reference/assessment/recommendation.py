@@ -93,8 +93,8 @@ def recommend(
 
 
 def chosen(known: Sequence[Expected], limits: Mapping[str, float]) -> tuple[Expected | None, Expected | None]:
-    """The best setting within the ``limits``, or None, and then the setting that exceeds them least. With a limit ``"error"`` the
-    cheapest setting is the best; with only a limit ``"time"`` [s] per frame, the most accurate.
+    """The best setting within the ``limits``, None if there is none, and in that case the setting that exceeds the limits least.
+    With a limit ``"error"`` the cheapest setting is the best; with only a limit ``"time"`` [s] per frame, the most accurate.
     """
     most = {"error": math.inf, "time": math.inf} | dict(limits)
     fitting = [one for one in known if one.error <= most["error"] and one.time <= most["time"]]

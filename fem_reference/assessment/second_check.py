@@ -1,4 +1,4 @@
-"""The second check of states that a solver calls converged. A run that it denies has the status ``denied`` and is never a truth."""
+"""The second check of states that a solver calls converged. A run that it denies has the status ``denied`` and is no truth."""
 
 import hashlib
 import logging

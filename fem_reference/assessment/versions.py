@@ -20,8 +20,8 @@ ORDER: tuple[Word, ...] = ("worse", "mixed", "better", "within the error bar", "
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """The distances of the statistic ``name`` from the reference, the earlier one (``was``) and the one ``now`` (f,), in ``unit``,
-    at frame ``numbers``. ``bars`` (f,): the error bars of the reference, NaN if unknown.
+    """The earlier and the current distance of the statistic ``name`` from the reference (``was`` and ``now`` (f,)), in ``unit``, at
+    frame ``numbers``. ``bars`` (f,): the error bars of the reference, NaN if unknown.
     """
 
     name: str

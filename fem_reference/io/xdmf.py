@@ -1,4 +1,4 @@
-"""Time series in XDMF, read with meshio. Their numbers are in the file itself or in HDF5 files in the same folder."""
+"""Time series in XDMF, read with meshio. Their data are in the file itself or in HDF5 files in the same folder."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -36,7 +36,7 @@ def _displacement(data: dict[str, Any], points: Floats) -> Any:
 
 
 def _check(item: Element, path: Path) -> None:
-    """Raise ValueError if the numbers of an ``item`` are neither in the file at ``path`` nor in an HDF5 file in its folder."""
+    """Raise ValueError if the data of an ``item`` are neither in the file at ``path`` nor in an HDF5 file in its folder."""
     if item.get("Format") == "XML":
         return
     if item.get("Format") != "HDF":

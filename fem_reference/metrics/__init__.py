@@ -38,8 +38,8 @@ class Statistic:
     ``curve``: the title of the plot of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: by place, the rank
     of the statistic in the order there, the lowest first. ``local``: True if its error converges like that of the worst point.
     ``lone``: True for the value of a single fibre or of the force on a bone, which is not a mean. ``pooled``: True if the
-    statistics of its metric belong to one field in one unit; a difference that is small by chance is then replaced by the rms of
-    all.
+    statistics of its metric belong to one field in one unit. A difference that is small by chance is then replaced by the rms of
+    the differences of all these statistics.
     """
 
     unit: str

@@ -22,9 +22,7 @@ _WRITERS = {".vtk": "PolyDataWriter", ".vtp": "XMLPolyDataWriter", ".vtu": "XMLU
 @dataclass(frozen=True, eq=False)
 class DataBlock:
     """A block of data: ``cells`` between ``points`` (n, 3) [mm], which are triangles (m, 3), tetrahedra (m, 4) or lines.
-
-    ``of_points`` and ``of_cells``: arrays by name, (n, ...) and (m, ...). ``numbers``: by name, numbers that belong to the entire
-    block.
+    ``of_points`` and ``of_cells``: arrays by name, (n, ...) and (m, ...). ``numbers``: by name, values for the entire block.
     """
 
     points: Floats
