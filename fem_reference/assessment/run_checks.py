@@ -98,7 +98,7 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """The overlap of parts that may touch; smoothing, compliance, gaps between points, and overlap already at rest are allowed."""
+    """Overlap of parts that may touch; smoothing, compliance, gaps between points and overlap remaining from rest are allowed."""
     for law in body.touching:
         edge, between, depth = longest_edge(body.mesh, law), unseen(body.mesh, law), partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0

@@ -115,7 +115,9 @@ class _Arrays:
         blocks, block, last = np.frombuffer(take(data, 3 * size), self.header).tolist()
         total = (blocks - 1) * block + (last or block) if blocks else 0
         if total > _MOST or blocks * size > len(data):
-            raise ValueError(f"an array of {total} bytes, more than {_MOST} or than the file has blocks for")
+            raise ValueError(
+                f"an array of {total} bytes in {blocks} blocks: too large, or more blocks than fit in the file"
+            )
         head = size * (3 + blocks)
         lengths = np.frombuffer(take(data, head), self.header)[3:].tolist()
         packed = take(data[4 * -(-head // 3) if take is _decoded else head :], sum(lengths))
