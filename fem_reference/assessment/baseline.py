@@ -47,8 +47,8 @@ README = (
 
 
 class StoredStatistic(Record):
-    """A statistic in ``unit``, with its ``values`` in each frame, None for a value that is not finite. ``tolerance``: the allowed
-    change of a value. ``within``: the allowed magnitude of a value, None if it is not known.
+    """A statistic in ``unit``, with its ``values`` in each frame, null for a value that is not finite. ``tolerance``: the allowed
+    change of a value. ``within``: the allowed magnitude of a value, null if it is not known.
     """
 
     tolerance: float = Field(ge=0)
@@ -79,11 +79,11 @@ class Positions(Record):
 
 
 class Baseline(Record):
-    """The contents of the file.
+    """The contents of a baseline file.
 
-    ``case``, ``scene`` and ``candidate``: the subject, with the scene given by its key. ``reference`` and ``fem_reference``: the
-    run of the reference and the version of the package with which the measures were made. ``frames`` (f,): the frame numbers.
-    ``measures``: the statistics by ``metric.statistic``.
+    ``case``, ``scene`` and ``candidate``: the subject of the baseline; the scene is given by its key. ``reference`` and
+    ``fem_reference``: the run of the reference and the version of the package with which the measures were made. ``frames`` (f,):
+    the frame numbers. ``measures``: the statistics by ``metric.statistic``.
     """
 
     candidate: str
