@@ -1,4 +1,4 @@
-"""Answers to the usual requests to studies: the best setting within an error limit, at a frame rate, at the knee of the front."""
+"""The settings that studies recommend for usual requests: within an error limit, at a frame rate, or at the knee of the front."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -6,14 +6,17 @@ from dataclasses import dataclass
 
 from fem_reference.assessment.recommendation import Expected, chosen
 
-ERRORS = (1.0, 5.0)  # the requested limits of the error, in the unit of the metric
-RATE = 60.0  # the requested rate [frames a second]
+ERRORS = (1.0, 5.0)  # the requested error limits, in the unit of the metric
+RATE = 60.0  # the requested frame rate [frames per second]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer to a request. ``limits``: upper limits of error and time [s], empty for the knee; ``best``: the best setting,
-    None if no setting meets the limits, and then ``nearest`` misses them least; ``by_solver``: the best setting of each solver.
+    """The answer to a request.
+
+    ``limits``: the upper limits of the error and of the time [s], empty for the knee. ``best``: the best setting, None if no
+    setting meets the limits. ``nearest``: if no setting meets the limits, the setting that exceeds them least. ``by_solver``: the
+    best setting of each solver that has one.
     """
 
     limits: Mapping[str, float]
@@ -23,7 +26,7 @@ class Answer:
 
 
 def answers(known: Sequence[Expected]) -> tuple[Answer, ...]:
-    """The answers for each requested error, for the requested rate, and for the knee."""
+    """The answers for each error limit, for the frame rate, and for the knee."""
     requests = [*({"error": error} for error in ERRORS), {"time": 1 / RATE}]
     names = dict.fromkeys(one.point.solver for one in known)
     of = {name: [one for one in known if one.point.solver == name] for name in names}
@@ -39,8 +42,10 @@ def answers(known: Sequence[Expected]) -> tuple[Answer, ...]:
 
 
 def knee(known: Iterable[Expected]) -> Expected | None:
-    """The setting at the knee of the front of error against time: in logarithms, farthest below the line between the front's ends
-    (Das 1999, Structural Optimization 18, 107-115). None if the front has fewer than three points, or no point is below the line.
+    """The setting at the knee of the front of error against time: on logarithmic axes, the setting farthest below the line that
+    joins the two ends of the front (Das 1999, Structural Optimization 18, 107-115).
+
+    None if the front has fewer than three points, or if no point lies below the line.
     """
     front = list[Expected]()
     for one in sorted(known, key=lambda one: (one.time, one.error)):

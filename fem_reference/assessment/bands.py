@@ -1,4 +1,4 @@
-"""Bands of results in each frame, from runs with varied parameters: from a surrogate if it is accurate, else from the runs."""
+"""Bands of results in each frame, from runs with varied parameters: from a surrogate if it is accurate, otherwise from the runs."""
 
 import math
 from dataclasses import dataclass, replace
@@ -10,20 +10,22 @@ from fem_reference.assessment.gaussian_process import GaussianProcess
 from fem_reference.assessment.uncertainty import Band, Parameter
 from fem_reference.foundations.mesh import Floats
 
-# The maximum error of a surrogate that may be used, as a fraction of the variance.
+# The maximum error of a surrogate that may be used, as a fraction of the variance of the results.
 WORST = 0.05
-# The maximum fraction of missing runs: if more were missing, all of them might lie beyond the 5th or 95th percentile.
+# The maximum fraction of runs without a result. If more were missing, they might all lie beyond the 5th or the 95th percentile.
 MISSING = 0.05
 # The minimum number of runs for percentiles without a surrogate: the 5th and the 95th percentile must lie between values of runs.
 FEWEST = 20
 PERCENTILES = (0.05, 0.5, 0.95)
 _SAMPLES = 15  # the number of samples, as a power of 2
-_SHARE = 1e-6  # the fraction of a field's variance that its principal components neglect
+_SHARE = 1e-6  # the maximum fraction of a field's variance in the principal components that are neglected
 
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """The ``parameters``, the number of runs ``wanted``, and the ``points`` (n, d), from -1 to 1, of the runs with results."""
+    """A design: the ``parameters``, the number of requested runs (``wanted``), and the ``points`` (n, d) of the runs that have
+    results, with coordinates from -1 to 1.
+    """
 
     parameters: tuple[Parameter, ...]
     points: Floats
@@ -31,7 +33,7 @@ class Design:
 
     @property
     def refused(self) -> str:
-        """The reason why these runs are too few for a band, empty if they are enough."""
+        """The reason why there are too few runs for a band; empty if there are enough."""
         made, variables = len(self.points), self.points.shape[1]
         if made < 2 * (variables + 1):
             return f"{made} runs have results, but {variables} parameters need at least {2 * (variables + 1)}"
@@ -42,14 +44,14 @@ class Design:
 
 
 def sampled(variables: int, runs: int, seed: int) -> Floats:
-    """Points (runs, d) from -1 to 1 of a Latin hypercube: each variable has one value in each of ``runs`` equal intervals."""
+    """Points (runs, variables) from -1 to 1 of a Latin hypercube: each variable has one value in each of ``runs`` equal parts."""
     from scipy.stats import qmc  # imported here, as this takes half a second
 
     return np.asarray(2 * qmc.LatinHypercube(variables, rng=np.random.default_rng(seed)).random(runs) - 1)
 
 
 def of_values(band: Band, design: Design, values: Floats) -> Band:
-    """The ``band`` filled from the ``values`` (n, f) of the runs, in the frames in which its nominal result is a number."""
+    """The ``band`` with percentiles of the ``values`` (n, f) of the runs, in the frames in which the nominal result is a number."""
     defined = np.isfinite(band.nominal)
     known = values[:, defined]
     refused = design.refused or _not_numbers(known)
@@ -62,8 +64,10 @@ def of_values(band: Band, design: Design, values: Floats) -> Band:
 
 
 def of_field(band: Band, design: Design, products: Floats) -> Band:
-    """The ``band`` of the weighted root mean square of a field. ``products`` (f, n, n): in each frame, the inner products of the
-    weighted fields of each pair of runs. The surrogate describes the principal components of the field, as the root is not smooth.
+    """The ``band`` of the weighted root mean square of a field.
+
+    ``products`` (f, n, n): for each frame, the inner products of the weighted fields of each pair of runs. The surrogate describes
+    the principal components of the field, because the square root is not a smooth function of the parameters.
     """
     if refused := design.refused or _not_numbers(products):
         return replace(band, refused=refused)
@@ -85,7 +89,9 @@ def of_field(band: Band, design: Design, products: Floats) -> Band:
 def _banded(
     band: Band, design: Design, surrogate: GaussianProcess, defined: Floats, runs: Floats, predicted: Floats
 ) -> Band:
-    """The ``band`` from values ``predicted`` (s, f) by a surrogate or, if its error is too large, from the ``runs`` (n, f)."""
+    """The ``band`` with percentiles from the values ``predicted`` (s, f) by a surrogate or, if the error of the surrogate is too
+    large, from the values of the ``runs`` (n, f).
+    """
     band = replace(band, error=surrogate.error)
     if surrogate.error <= WORST:
         keys = [one.key for one in design.parameters]
@@ -102,20 +108,20 @@ def _banded(
 
 
 def _filled(band: Band, defined: Floats, found: Floats) -> Band:
-    """The ``band`` with the percentiles ``found`` (3, k) in the ``defined`` frames."""
+    """The ``band`` with the percentiles ``found`` (3, k) in the ``defined`` frames, and NaN in all other frames."""
     whole = np.full((3, len(band.nominal)), math.nan)
     whole[:, defined] = found
     return replace(band, low=whole[0], median=whole[1], high=whole[2])
 
 
 def _samples(design: Design) -> Floats:
-    """Points at which a surrogate is evaluated."""
+    """Points (s, d) from -1 to 1 at which a surrogate is evaluated."""
     from scipy.stats import qmc
 
     return np.asarray(2 * qmc.Sobol(len(design.parameters), rng=np.random.default_rng(0)).random_base2(_SAMPLES) - 1)
 
 
 def _not_numbers(values: Floats) -> str:
-    """The reason to refuse ``values`` that are not all finite, empty if all are."""
+    """The reason to refuse ``values`` if some of them are not finite; empty if all are finite."""
     bad = int((~np.isfinite(values)).sum())
     return f"{bad} values of runs are not numbers" if bad else ""

@@ -1,4 +1,4 @@
-"""The baseline of a candidate: a JSON file with its earlier measures and positions, and the allowed changes since then."""
+"""The baseline of a candidate: a JSON file with earlier measures and positions of the candidate, and the allowed changes."""
 
 import json
 import logging
@@ -25,18 +25,19 @@ from fem_reference.scenes.muscle import MuscleCase
 log = logging.getLogger(__name__)
 
 FORMAT = 1
-# The number of stored decimal places: of a statistic, by its unit, and of a coordinate [mm].
+# The number of decimal places that are stored: for a statistic, by its unit, and for a coordinate [mm].
 PLACES = {"mm": 4, "%": 4, "deg": 4, "mm3": 1, "N": 4, "N mm": 2, "kPa": 4}
 POSITION_PLACES = 2
 # The maximum distance [mm] between a position and its rounded value.
 POSITION_ROUNDING = math.sqrt(3) * 0.5 * 10**-POSITION_PLACES
-# The number of sampled vertices, which take about 1.3 kB per frame. Motion of other vertices is visible only in the statistics.
+# The number of sampled vertices, which take about 1.3 kB per frame. If only other vertices move, this shows only in the statistics.
 SAMPLED = 64
-# The tolerance of positions [mm] in a new baseline, far below visible differences. It must be larger if machines differ more.
+# The tolerance of positions [mm] in a new baseline, far below visible differences. It must be increased if the results of different
+# machines differ by more.
 MOVED = 0.1
 # The tolerance of a statistic is at most this fraction of its maximum over the frames.
 SHARE = 0.02
-# The allowed value is slightly above the measured value, to allow for rounding.
+# The allowed value is the measured value times this factor, to allow for rounding.
 _ROUNDING = 1 + 1e-6
 README = (
     "tolerance: the allowed distance of a value from the value stored here; within: its allowed distance from the reference, in "
@@ -46,7 +47,9 @@ README = (
 
 
 class StoredStatistic(Record):
-    """One statistic in ``unit``: ``values`` per frame, ``tolerance`` for a change, and ``within``, the limit on their magnitude."""
+    """A statistic in ``unit``, with its ``values`` in each frame, null for a value that is not finite. ``tolerance``: the allowed
+    change of a value. ``within``: the allowed magnitude of a value, null if it is not known.
+    """
 
     tolerance: float = Field(ge=0)
     unit: str
@@ -55,27 +58,32 @@ class StoredStatistic(Record):
 
     @property
     def numbers(self) -> Floats:
-        """The values (f,), NaN where there is none."""
+        """The values (f,), with NaN in place of None."""
         return np.array(self.values, float)
 
 
 class Positions(Record):
-    """Positions ``values`` (f, s, 3) [mm] of sampled ``vertices`` (s,) of ``CurrentMeasures.points``; their ``tolerance`` [mm]."""
+    """Positions ``values`` (f, s, 3) [mm] of sampled vertices, and the ``tolerance`` [mm] for their change. ``vertices`` (s,): the
+    indices of the sampled vertices in ``CurrentMeasures.points``.
+    """
 
     tolerance: float = Field(ge=0)
     values: tuple[tuple[tuple[float, float, float] | None, ...], ...]
     vertices: tuple[Annotated[int, Field(ge=0)], ...] = Field(min_length=1)
 
     def points(self, count: int, place: str) -> Floats:
-        """The values (f, s, 3), NaN where there is none; InputError at ``place`` if a vertex number is not below ``count``."""
+        """The positions (f, s, 3) [mm], NaN for None. Raises InputError at ``place`` if a vertex number is not below ``count``."""
         if max(self.vertices) >= count:
             raise InputError(f"{place}: positions.vertices", max(self.vertices), f"0 to {count - 1}")
         return np.array([[(math.nan,) * 3 if one is None else one for one in frame] for frame in self.values])
 
 
 class Baseline(Record):
-    """The contents of the file: its subject (``case``, ``scene`` key, ``candidate``), its provenance (``reference`` run and
-    version of ``fem_reference``), the ``frames`` (f,), and the measures by ``metric.statistic``.
+    """The contents of a baseline file.
+
+    ``case``, ``scene`` and ``candidate``: the subject of the baseline; the scene is given by its key. ``reference`` and
+    ``fem_reference``: the run of the reference and the version of the package with which the measures were made. ``frames`` (f,):
+    the frame numbers. ``measures``: the statistics by ``metric.statistic``.
     """
 
     candidate: str
@@ -91,13 +99,13 @@ class Baseline(Record):
 
 
 def check(path: Path, case: MuscleCase, candidate: str) -> None:
-    """Raise InputError if an update of ``path`` would overwrite a damaged file, or a file of another case or candidate."""
+    """Raise InputError if an update of ``path`` would overwrite a damaged file, or the baseline of another case or candidate."""
     if path.exists():
         _check_whose(path, _read(path), case, candidate)
 
 
 def read(path: Path, case: MuscleCase, candidate: str) -> Baseline:
-    """The baseline in ``path``; InputError if it is missing, damaged, or of another case, scene or candidate."""
+    """The baseline in ``path``. Raises InputError if it is missing, damaged, or of another case, scene or candidate."""
     baseline = _read(path)
     _check_whose(path, baseline, case, candidate)
     if baseline.scene != case.key:
@@ -106,14 +114,18 @@ def read(path: Path, case: MuscleCase, candidate: str) -> Baseline:
         raise InputError(f"{path}: scene", got, want)
     if baseline.frames != case.numbers:
         raise InputError(
-            f"{path}: frames", f"{len(baseline.frames)} numbers that differ from the scene's", "its frame numbers"
+            f"{path}: frames",
+            f"{len(baseline.frames)} frame numbers that differ from the scene's",
+            "the scene's frame numbers",
         )
     return baseline
 
 
 def update(path: Path, current: CurrentMeasures) -> Baseline:
-    """Write the current values into ``path``. Every tolerance, and every ``within`` that is a number, stay as in the file, so that
-    accuracy cannot be lost in small steps; statistics removed from the file are not added again.
+    """Write the current values into ``path`` and return the new baseline.
+
+    Every tolerance, and every ``within`` that is a number, is kept as it is in the file, so that accuracy cannot be lost in small
+    steps. Statistics that were removed from the file are not added again.
     """
     check(path, current.scene, current.candidate.name)
     before = _read(path) if path.exists() else None
@@ -157,7 +169,7 @@ def _read(path: Path) -> Baseline:
 
 
 def _check_shape(place: str, baseline: Baseline) -> None:
-    """Raise InputError unless all lists that belong together are equally long, and every statistic exists."""
+    """Raise InputError unless all lists that belong together have the same length and every statistic exists."""
     known, frames = metrics.units(), len(baseline.frames)
     for name, stored in baseline.measures.items():
         key = f"{place}: measures.{name}"
@@ -180,7 +192,9 @@ def _check_whose(path: Path, baseline: Baseline, case: MuscleCase, candidate: st
 
 
 def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> StoredStatistic:
-    """A statistic with its limits from ``before``, or else from its error bars."""
+    """The statistic ``one`` as it is stored. Its limits are kept from ``before``; limits that are missing there follow from the
+    error ``bars`` (f,).
+    """
     tolerance, within = limits(one, bars)
     if before is not None:
         tolerance, within = before.tolerance, within if before.within is None else before.within
@@ -190,12 +204,13 @@ def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> Store
 
 
 def limits(one: Measure, bars: Floats) -> tuple[float, float | None]:
-    """The limits of a statistic in a new baseline, from the error bars (f,) of its deviation: the tolerance for changes, and the
-    maximum distance from the reference (None if not known).
+    """The tolerance for changes of a statistic in a new baseline, and its maximum distance from the reference, None if this is not
+    known.
 
-    Tolerance: the maximum bar, as smaller changes do not matter, but at most ``SHARE`` of the maximum value, as stored values are
-    exact even if the reference is uncertain. Distance: the maximum sum of a value and its bar; for a measure of the run itself,
-    which has no bar, the maximum value plus its tolerance.
+    ``bars`` (f,): the error bars of the deviation. The tolerance is the maximum bar, because smaller changes do not matter, but at
+    most ``SHARE`` of the maximum value, because stored values are exact even if the reference is uncertain. The maximum distance is
+    the maximum sum of a value and its bar. A measure of the run itself has no bar: its tolerance is ``SHARE`` of the maximum value,
+    and its maximum distance is the maximum value plus this tolerance.
     """
     least = 10.0 * 10.0 ** -PLACES[one.unit]
     values, bar, itself = np.abs(one.values), greatest(bars), metrics.of_itself(one.metric)
@@ -208,7 +223,7 @@ def limits(one: Measure, bars: Floats) -> tuple[float, float | None]:
 
 
 def _up(value: float) -> float:
-    """Three significant digits, rounded up.
+    """The ``value`` rounded up to three significant digits.
 
     >>> _up(0.123456), _up(20.0), _up(0.0)
     (0.124, 20.0, 0.0)
@@ -227,7 +242,7 @@ def _rounded(point: Floats) -> tuple[float, float, float] | None:
 
 
 def text(value: Any, indent: str = "") -> str:
-    """JSON with sorted keys, one line for each key and each entry of a list of lists, so that a change affects few lines."""
+    """JSON with sorted keys; each key, and each entry of a list of lists, has its own line, so that a change affects few lines."""
     inside = f"{indent} "
     if isinstance(value, dict):
         rows: Iterable[str] = (f"{json.dumps(key)}: {text(value[key], inside)}" for key in sorted(value))

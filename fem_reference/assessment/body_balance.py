@@ -1,4 +1,4 @@
-"""The balance of forces on a body: recorded forces of boundary conditions and bones, and dead loads, without solver residuals."""
+"""The balance of the forces on a body, checked with recorded forces and dead loads, independently of the solver's residuals."""
 
 import math
 from collections.abc import Iterator
@@ -15,14 +15,16 @@ from fem_reference.runs.store import Frame, Run
 
 
 def balance(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Checks that recorded forces on a ``body`` and dead loads sum to zero; without loads, also moments about the origin. There is
-    no check if some forces are unknown: for a body that starts displaced or under tension; with a user's own effects, follower
-    loads, inertia or drag; with loads on cells other than straight tetrahedra; if two regions share nodes and a prescribed
-    component, as each region then records the force of these nodes.
+    """Check that the recorded forces on a ``body`` and its dead loads sum to zero. Without loads, the moments about the origin are
+    checked too.
+
+    There is no check if some forces are unknown: for a body that starts displaced or under tension; with a user's own effects,
+    follower loads, inertia or drag; and with loads on cells other than straight tetrahedra. There is no check either if two regions
+    share nodes and a prescribed component, because each of the two regions then records the force on these nodes.
     """
     residual, unknowns = getattr(solved.settings, "residual", math.nan), solved.outcome.cost.get("unknowns", math.nan)
     allowed, outer = BALANCE * residual * math.sqrt(unknowns), any(one.outer for one in body.effects)
-    for state in () if body.begun else solved.states[1:]:  # the first state is prescribed, and need not be in balance
+    for state in () if body.begun else solved.states[1:]:  # the first state is prescribed and need not be in balance
         load = _load(body, state.number)
         if load is None or not math.isfinite(allowed) or not _counted_once(body, state):
             return
@@ -39,7 +41,7 @@ def _sum(vectors: dict[str, Floats]) -> Floats:
 
 
 def _counted_once(body: Body, state: Frame) -> bool:
-    """True if a ``state`` records every force on a ``body``, and none twice."""
+    """True if a ``state`` records every force on a ``body`` exactly once."""
     others = {bone.name for bone in body.bones} | {name for law in body.touching for name in law.forces}
     names = {entry.name for entry in body.prescribed}
     if names & others or not names <= set(state.forces) or set(state.forces) != set(state.moments):
@@ -50,7 +52,7 @@ def _counted_once(body: Body, state: Frame) -> bool:
 
 
 def _load(body: Body, frame: float) -> Floats | None:
-    """The force (3,) [N] of external loads at a frame; None if it is not known from the shape at rest."""
+    """The sum (3,) [N] of the external loads at a ``frame``; None if the shape at rest is not enough to compute it."""
     if not all(type(one).__module__.startswith("fem_reference.effects.") for one in body.effects):
         return None
     acting, mesh = [one for one in body.effects if one.outer], body.mesh

@@ -1,4 +1,4 @@
-"""Parameters of a case fitted to measurements: least squares, confidence intervals, and undetermined parameters."""
+"""Parameters of a case fitted to measurements by least squares, with confidence intervals and undetermined parameters."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -19,26 +19,27 @@ from fem_reference.io.texts import plain
 
 COLUMNS = ("frame", "quantity", "value", "unit", "sd")
 CONFIDENCE = 0.95
-# Fractions of a parameter's range: the step of finite differences, and the distance within which a value counts as at an end.
+# Fractions of a parameter's range: the step of finite differences, and the distance from an end of the range within which a value
+# counts as being at this end.
 _STEP, _AT = 1e-3, 1e-3
 # Two estimates whose errors are correlated by more than this are reported as a pair.
 _CORRELATED = 0.95
 # A combination of parameters is undetermined if its singular value is below this fraction of the largest.
 _NOTHING = 1e-6
 _WANT = f"a CSV file whose first row is {','.join(COLUMNS)}"
-# A function from several points (d,), in fractions of the ranges, to the values (m,) that the run at each point gives for the
-# measured quantities; None for a point without a result.
+# A function that evaluates the model at several points (d,), whose coordinates are fractions of the ranges of the parameters. For
+# each point it returns the values (m,) of the measured quantities, or None if the run has no result.
 Forward = Callable[[Sequence[Floats]], Sequence[Floats | None]]
 # The maximum number of evaluations per parameter, not counting finite differences.
 _MOST = 50
-# The law fits the data if the residuals scatter by at most this many standard deviations of the data.
+# The law fits the data if the root mean square residual is at most this many standard deviations of the data.
 FOLLOWED = 2.0
 _ENDED = "a run that the fit needs has no result"
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """A measurement: ``value`` and standard deviation ``sd``, in ``unit``, of a ``quantity``; ``place``: its file and row."""
+    """A measurement: the ``value`` of a ``quantity`` and its standard deviation ``sd`` in ``unit``; ``place``: the file and row."""
 
     frame: int
     quantity: str
@@ -50,8 +51,10 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fitted parameter, in the unit of ``parameter``: its ``value`` and confidence interval from ``low`` to ``high``, infinite if
-    the measurements do not determine it; ``at``: the end of the range at which it lies, ``"low"``, ``"high"`` or empty.
+    """The fitted ``value`` of a parameter, in the unit of ``parameter``.
+
+    ``low`` and ``high``: the ends of the confidence interval, infinite if the measurements do not determine the parameter. ``at``:
+    the end of the allowed range at which the value lies, ``"low"`` or ``"high"``; otherwise empty.
     """
 
     parameter: Parameter
@@ -62,17 +65,19 @@ class Estimate:
 
     @property
     def is_known(self) -> bool:
-        """True if the interval is narrower than the allowed range."""
+        """True if the confidence interval is narrower than the allowed range."""
         return self.high - self.low < self.parameter.high - self.parameter.low
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Fitted ``estimates`` of a case. ``scatter``: root mean square of the residuals, per degree of freedom, in standard deviations
-    of the data: near 1 if law and data agree. ``singular``: singular values of the matrix of sensitivities, in standard deviations
-    per range. ``pairs``: titles of parameters whose errors are correlated, with the correlation. ``runs``: the number of requested
-    runs; ``failures``: the failed runs; ``ended``: the reason why the fit could not continue and has no intervals, else empty;
-    ``converged``: True if no further step reduces the residuals.
+    """The result of a fit: the ``estimates`` of the parameters of a case, the measurements (``rows``) and the ``fitted`` values.
+
+    ``scatter``: the root mean square residual per degree of freedom, in standard deviations of the data; it is near 1 if law and
+    data agree. ``singular``: the singular values of the matrix of sensitivities, in standard deviations per range. ``pairs``: the
+    titles of two parameters whose errors are correlated, and the correlation. ``runs``: the number of requested runs.
+    ``converged``: True if no further step reduces the residuals. ``failures``: the failed runs. ``ended``: the reason why the fit
+    could not continue and has no intervals; otherwise empty.
     """
 
     case: str
@@ -94,12 +99,14 @@ class Calibration:
 
     @property
     def holds(self) -> bool:
-        """True if the fit has converged, the law fits the data, and each estimate is determined and inside its range."""
+        """True if the fit has converged, the law fits the data, and each estimate is determined and lies inside its range."""
         return self.converged and self.is_followed and all(one.is_known and not one.at for one in self.estimates)
 
 
 def read(path: Path, units: Callable[[str, str], str]) -> tuple[Measurement, ...]:
-    """The measurements in a CSV file; ``units(quantity, place)`` is the unit of a quantity, or InputError if there is none."""
+    """The measurements in a CSV file. ``units(quantity, place)``: a function that returns the unit of a quantity, or raises
+    InputError if the quantity has none.
+    """
     head, *lines = files.read_rows(path) or [[]]
     if tuple(one.strip() for one in head) != COLUMNS:
         raise InputError(path, f'the first row "{",".join(head)}"', _WANT)
@@ -127,18 +134,18 @@ def _row(line: list[str], place: str, units: Callable[[str, str], str]) -> Measu
 
 
 class _NoAnswerError(Exception):
-    """Raised if the fit needs a point that has no result."""
+    """Raised if a point that the fit needs has no result."""
 
 
 class _Residuals:
-    """Differences between runs and measurements, in standard deviations. Each point is evaluated once."""
+    """Differences between runs and measurements, in standard deviations. Each point is evaluated only once."""
 
     def __init__(self, forward: Forward, rows: Sequence[Measurement]) -> None:
         self.forward, self.known = forward, dict[bytes, Floats]()
         self.values, self.deviations = (np.array([getattr(row, name) for row in rows]) for name in ("value", "sd"))
 
     def at(self, points: Sequence[Floats]) -> list[Floats]:
-        """The residuals (m,) at each point, infinite if the point has no result."""
+        """The residuals (m,) at each of the ``points``, infinite for a point without a result."""
         asked = [point for point in points if point.tobytes() not in self.known]
         for point, found in zip(asked, self.forward(asked), strict=True):
             lost = np.full(len(self.values), np.inf)
@@ -147,7 +154,7 @@ class _Residuals:
         return [self.known[point.tobytes()] for point in points]
 
     def slopes(self, point: Floats, *_: Any) -> Floats:
-        """Finite differences (m, d) of the residuals, with steps into the interior of the ranges."""
+        """Finite differences (m, d) of the residuals at a ``point``, with steps towards the interior of the ranges."""
         steps = np.where(point < 0.5, _STEP, -_STEP)
         at, *moved = self.at([point, *(point + np.diag(steps))])
         if not np.isfinite([at, *moved]).all():
@@ -155,15 +162,18 @@ class _Residuals:
         return np.stack([(one - at) / step for one, step in zip(moved, steps, strict=True)], axis=1)
 
     def best(self) -> tuple[Floats, Floats] | None:
-        """The point with the least sum of squared residuals so far, and these residuals; None before there are any."""
+        """The evaluated point with the smallest sum of squared residuals, and its residuals; None if no point has a result."""
         points = [(np.frombuffer(key), left) for key, left in self.known.items() if np.isfinite(left).all()]
         return min(points, key=lambda one: float(one[1] @ one[1])) if points else None
 
 
 def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measurement], case: str) -> Calibration:
-    """The parameters within their ranges for which the values of ``forward`` are nearest to the measurements, in standard
-    deviations. The fit starts from the values of the case and steps back from a point without a result. If the start or a point for
-    sensitivities has no result, the fit ends with the reason. InputError unless there are more measurements than parameters.
+    """Fit the parameters, within their ranges, so that the values of ``forward`` are nearest to the measurements (``rows``) in
+    standard deviations.
+
+    The fit starts from the values of the case, and retreats from a point without a result. If the starting point, or a point at
+    which sensitivities are needed, has no result, the fit ends and states this reason. Raises InputError unless there are more
+    measurements than parameters.
     """
     if len(rows) <= len(parameters):
         raise InputError("data", f"{len(rows)} rows for {len(parameters)} parameters", "more rows than parameters")
@@ -189,7 +199,9 @@ def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measur
 
 
 def _ended(residuals: _Residuals, parameters: Sequence[Parameter]) -> tuple[Calibration, Floats]:
-    """The best point of a fit that could not continue, without intervals, and the residuals there, NaN if there are none."""
+    """The best point of a fit that could not continue, without intervals, and the residuals at this point, NaN if no point has a
+    result.
+    """
     best, freedom = residuals.best(), len(residuals.values) - len(parameters)
     left = np.full(len(residuals.values), np.nan) if best is None else best[1]
     known = () if best is None else zip(parameters, best[0], strict=True)
@@ -207,7 +219,9 @@ def _finite(residuals: Floats) -> Floats:
 
 
 def _judged(point: Floats, left: Floats, slopes: Floats, parameters: Sequence[Parameter]) -> Calibration:
-    """Confidence intervals by Student's t from the singular values of the ``slopes`` (m, d) and the residuals ``left`` (m,)."""
+    """The estimates at the fitted ``point``, with confidence intervals by Student's t from the singular values of the ``slopes``
+    (m, d) and from the residuals ``left`` (m,).
+    """
     freedom = len(left) - len(point)
     scatter = float(np.sqrt(left @ left / freedom))
     _, singular, rows = np.linalg.svd(slopes, full_matrices=False)
@@ -223,15 +237,19 @@ def _judged(point: Floats, left: Floats, slopes: Floats, parameters: Sequence[Pa
 
 
 def _estimate(parameter: Parameter, place: float, width: float) -> Estimate:
-    """The estimate at a ``place`` in its range; the place and the half-width of the interval are fractions of the range."""
+    """The estimate of a ``parameter``. ``place`` and ``width``: the position of the value in the range, and the half-width of the
+    confidence interval, both as fractions of the range.
+    """
     at = "low" if place < _AT else "high" if place > 1 - _AT else ""
     low, value, high = (parameter.at(one) for one in (place - width, place, place + width))
     return Estimate(parameter, value, low, high, at)
 
 
 def _pairs(covariance: Floats, nothing: Floats, parameters: Sequence[Parameter]) -> tuple[tuple[str, str, float], ...]:
-    """The titles of pairs of parameters whose errors are correlated, with the correlation: from the undetermined combinations
-    ``nothing`` if both parameters occur in them, else from the ``covariance`` of the determined combinations.
+    """The titles of each pair of parameters whose errors are correlated, with the correlation.
+
+    ``nothing`` (k, d): the combinations of parameters that the measurements do not determine. The correlation is computed from
+    these if both parameters occur in them, otherwise from the ``covariance`` of the determined combinations.
     """
     lost, found = nothing.T @ nothing, list[tuple[str, str, float]]()
     for i, one in enumerate(parameters):

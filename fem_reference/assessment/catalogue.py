@@ -11,26 +11,28 @@ from fem_reference.problems.body import Body
 from fem_reference.runs.store import Run
 
 Kind = Literal["closed form", "published", "second solver", "property", "experiment"]
-# The allowed relative difference between the value of an experiment and its pinned value, caused by root finding and processors.
+# The allowed relative difference between the value of an experiment and its pinned value. Such differences come from root finding
+# and from different processors.
 PINNED = 1e-5
 
 
 class Lab(Protocol):
-    """The solvers that measure entries."""
+    """The two solvers with which entries are measured."""
 
     def solve(self, body: Body, element: str, **settings: float) -> Run:
-        """The states of ``body`` computed by the reference, FEniCSx, with an element of ``body.ELEMENTS``; settings as in
-        ``BodySettings`` (first_step, smallest_step, newton_iterations, residual [N, mm3]).
+        """Solve ``body`` with the reference solver, FEniCSx, using an ``element`` of ``body.ELEMENTS``. The ``settings`` are keys
+        of ``BodySettings`` (first_step, smallest_step, newton_iterations, residual [N, mm3]).
         """
 
     def second(self, body: Body, element: str, **settings: float) -> Run:
-        """The states of the same problem computed by the second solver, scikit-fem."""
+        """Solve the same problem with the second solver, scikit-fem."""
 
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """A measurement: the ``value``; on a ladder of meshes also the ``order`` of its error, and the ``ladder`` of (mesh size [mm],
-    value) from coarse to fine; ``note``: further facts for readers.
+    """The result of a measurement: the measured ``value``. ``ladder``: on several meshes, the (mesh size [mm] or time step [s],
+    value) of each, from coarse to fine. ``order``: the order of convergence of the error on the ladder. ``note``: further facts for
+    readers.
     """
 
     value: float
@@ -41,11 +43,11 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """Meshes or time steps, from coarse to fine.
+    """A sequence of meshes or time steps, from coarse to fine.
 
-    ``counts``: numbers of cells or steps, each of ``size / count`` [mm] or [s]. The theoretical ``order`` of the error must be met
-    to within 0.5; None: no order is measured. If ``extrapolated``, the value is extrapolated from the last two counts, for an
-    error of first order. ``note``: further facts for readers.
+    ``counts``: the numbers of cells or steps, each of ``size / count`` [mm] or [s]. ``order``: the theoretical order of
+    convergence, from which the measured order may differ by at most 0.5; None if no order is measured. ``extrapolated``: True if
+    the value is extrapolated from the last two counts, for an error of first order. ``note``: further facts for readers.
     """
 
     counts: tuple[int, ...]
@@ -56,11 +58,11 @@ class Refinement:
 
     @property
     def needed(self) -> tuple[int, ...]:
-        """The counts needed for the value."""
+        """The counts that are needed for the value."""
         return self.counts[-2 if self.extrapolated else -1 :]
 
     def value(self, found: Sequence[float]) -> float:
-        """The judged value, from the values ``found``, in order from coarse to fine."""
+        """The value that is judged. ``found``: the measured values, from coarse to fine."""
         return 2 * found[-1] - found[-2] if self.extrapolated else found[-1]
 
 
@@ -68,17 +70,18 @@ class Refinement:
 class Entry:
     """A problem with a known answer.
 
-    ``measure`` computes the number to compare with ``truth``, both in ``unit``. Its arguments are a lab, each count of a
-    ``refinement`` if there is one, and the values ``given`` by name. The number must equal the truth to ``within`` (in ``unit``, or
-    relative to the truth if ``relative``), for the reason ``because``. ``source``: the source of the truth; ``kind``: its type.
-    ``negative_control`` names a deliberate mistake; with the values ``wrong`` instead of ``given`` the entry must fail. ``slow``: a
-    measurement takes more than 4 s, or resembles another; ``slow_negative_control``: the same for the control. Only ``verify``
-    makes slow measurements.
+    ``measure`` computes the number that is compared with ``truth``, both in ``unit``. Its arguments are a lab, a count if there is
+    a ``refinement`` (it is called for each count), and the values ``given`` by name. The number must equal the truth to within
+    ``within`` (in ``unit``, or relative to the truth if ``relative``), for the reason in ``because``. ``source`` and ``kind``: the
+    source of the truth and its type. ``negative_control``: a deliberate mistake, in words: with the values ``wrong`` instead of
+    ``given`` the entry must fail. ``slow``: True if a measurement takes more than 4 s, or resembles another measurement;
+    ``slow_negative_control``: the same for the negative control. Only the verb ``verify`` makes slow measurements.
 
-    An entry of the kind "experiment" compares a model with a muscle: its verdict is "within" or "outside" the uncertainty of the
-    experiment, and neither is a failure. It fails if the value no longer equals ``pinned``. ``facts``: the measured numbers from
-    which its truth is computed; ``is_order``: True for a stiffness ranking: the value is 1 if it is reproduced, else 0,
-    and the tolerance 0.5; ``from_memory``: True if a part of its model or source is recalled, not checked in the publication.
+    An entry of the kind "experiment" compares a model with a real muscle. Its verdict is "within" or "outside" the uncertainty of
+    the experiment, and neither is a failure; the entry fails if the value no longer equals ``pinned``. ``facts``: the measured
+    numbers from which the truth is computed. ``is_order``: True for a ranking of stiffnesses: the value is 1 if the ranking is
+    reproduced and 0 if it is not, and the tolerance is 0.5. ``from_memory``: True if a part of the model or of its source is
+    recalled and was not checked in the publication.
     """
 
     name: str
@@ -108,7 +111,7 @@ class Entry:
         return float(self.truth() if callable(self.truth) else self.truth)
 
     def find(self, lab: Lab, *, with_negative_control: bool = False) -> Finding:
-        """The finding; the negative control is measured only on the counts that the value needs."""
+        """Measure the entry with a ``lab``. The negative control is measured only for the counts that the value needs."""
         given = {**self.given, **(self.wrong if with_negative_control else {})}
         if self.refinement is None:
             return _finding(self.measure(lab, **given))
@@ -123,15 +126,16 @@ class Entry:
 
 def _finding(found: float | Finding | None) -> Finding:
     if found is None:
-        return Finding(math.nan, note="it measured no value")
+        return Finding(math.nan, note="no value was measured")
     return found if isinstance(found, Finding) else Finding(found)
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """The result of an entry. ``word``: the verdict: pass or fail, inconclusive without a truth, and for an experiment within or
-    outside; ``error``: the absolute error, and ``within``: its bound, both in the unit of the entry. Without a measurement or a
-    truth they are NaN, and the note of the finding gives the reason.
+    """The result of an entry: its ``finding`` compared with the ``truth``.
+
+    ``within``: the allowed absolute error, in the unit of the entry. Without a measurement or a truth the error is NaN, and the
+    note of the finding gives the reason. ``seconds``: the duration of the measurement.
     """
 
     entry: Entry
@@ -148,7 +152,9 @@ class Result:
 
     @property
     def word(self) -> str:
-        """Pass, fail or inconclusive; for an experiment within or outside its uncertainty, or fail if the value has changed."""
+        """The verdict: pass, fail or inconclusive; for an experiment within or outside its uncertainty, or fail if the value has
+        changed.
+        """
         judged, pinned = judge(self.finding.value, self.truth, self.within), self.entry.pinned
         if pinned is None:
             return judged
@@ -158,14 +164,14 @@ class Result:
 
 
 def result(entry: Entry, finding: Finding, seconds: float, *, with_negative_control: bool) -> Result:
-    """The result of an entry: its finding, compared with its truth."""
+    """The result of an entry: its ``finding``, compared with the truth."""
     truth = entry.known()
     within = entry.within * (abs(truth) if entry.relative else 1.0)
     return Result(entry, finding, truth, within, seconds, with_negative_control)
 
 
 def order(ladder: tuple[tuple[float, float], ...], truth: float) -> float | None:
-    """The order of the error over the last two meshes of a ``ladder`` of (size, value), None if either is exact.
+    """The order of convergence on the last two meshes of a ``ladder`` of (size, value); None if one of these two values is exact.
 
     >>> round(order(((2.0, 1.04), (1.0, 1.01)), 1.0), 6)
     2.0
@@ -179,7 +185,7 @@ def order(ladder: tuple[tuple[float, float], ...], truth: float) -> float | None
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """The ``results`` of entries in the order of the catalogue, the wall time in ``seconds``, and the ``versions`` of packages."""
+    """The ``results`` in the order of the catalogue, the wall-clock time in ``seconds``, and the ``versions`` of packages."""
 
     results: tuple[Result, ...]
     seconds: float
@@ -187,34 +193,34 @@ class Verification:
 
     @property
     def failed(self) -> tuple[Result, ...]:
-        """The results that do not pass; experiments within or outside their uncertainty pass."""
+        """The results that do not pass. An experiment passes both within and outside its uncertainty."""
         return tuple(one for one in self.results if one.word not in ("pass", "within", "outside"))
 
     @property
     def judged(self) -> tuple[Result, ...]:
-        """The results with a verdict of pass, fail or inconclusive: of all entries except experiments."""
+        """The results of all entries except experiments; their verdicts are pass, fail or inconclusive."""
         return tuple(one for one in self.results if one.entry.kind != "experiment")
 
     @property
     def passed(self) -> str:
-        """The number of judged results that pass, in words; empty if there are none."""
+        """The number of judged results that pass, in words; empty if there are no judged results."""
         failed = sum(one in self.failed for one in self.judged)
         return f"{len(self.judged) - failed} of {len(self.judged)} pass" if self.judged else ""
 
     @property
     def beside(self) -> str:
-        """The number of experiments, and the number that agree within their uncertainty, in words; empty without experiments."""
+        """The number of experiments that agree within their uncertainty, out of all, in words; empty without experiments."""
         words = [one.word for one in self.results if one.entry.kind == "experiment"]
         return f"{words.count('within')} of {len(words)} experiments agree within their uncertainty" if words else ""
 
     @property
     def word(self) -> str:
-        """Pass or fail."""
+        """The overall verdict, pass or fail."""
         return "fail" if self.failed else "pass"
 
     @property
     def summary(self) -> str:
-        """The verdict in one line."""
+        """The overall verdict in one line."""
         controls = sum(one.with_negative_control for one in self.results)
         note = f"{controls} measured with their negative control" if controls else ""
         said = filter(None, (self.word, self.passed, note, self.beside, f"{self.seconds:.0f} s"))

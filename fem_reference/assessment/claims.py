@@ -1,4 +1,4 @@
-"""Error bars of references, compared with the differences from finer solutions that the bars do not use."""
+"""Error bars of references, compared with the differences from finer solutions. The bars are computed without these solutions."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from fem_reference.assessment.error_bars import ErrorBars, Of
 from fem_reference.metrics import Measure, described, find
 
-# The finer solution has a separate mesh, whose tetrahedra have this fraction of the reference's size.
+# The finer solution has a mesh of its own; the size of its tetrahedra is this fraction of the size in the reference.
 FINER = 0.8
 # Statistics whose bars are compared with errors: metric and name.
 CLAIMED = tuple(described("claim"))
@@ -18,7 +18,7 @@ LEAST = 1e-6
 
 @dataclass(frozen=True)
 class Claim:
-    """The ``bar`` of a statistic at a ``frame`` of a ``case``, and the statistic's difference ``error`` from the finer solution."""
+    """The error ``bar`` of a statistic at a ``frame`` of a ``case``, and its ``error``, the difference from the finer solution."""
 
     case: str
     of: Of
@@ -31,7 +31,9 @@ class Claim:
 
 @dataclass(frozen=True)
 class Cover:
-    """The ``count`` of claims with an error, the fraction ``share`` with an error within the bar, the ``median`` of bar / error."""
+    """A summary of claims: the ``count`` of claims whose error exceeds rounding, the fraction of these claims whose error is within
+    the bar (``share``), and the ``median`` of bar / error.
+    """
 
     count: int
     share: float
@@ -39,7 +41,7 @@ class Cover:
 
     @classmethod
     def of(cls, claims: Iterable[Claim]) -> "Cover":
-        """The cover of ``claims``; fraction and median are NaN if no claim has an error above rounding."""
+        """The summary of ``claims``; fraction and median are NaN if no error exceeds rounding."""
         known = [claim for claim in claims if claim.error > LEAST]
         if not known:
             return cls(0, np.nan, np.nan)
@@ -49,7 +51,9 @@ class Cover:
 
 @dataclass(frozen=True, eq=False)
 class Claims:
-    """All claims; by case the ``sizes`` [mm] of the reference's and the finer tetrahedra, and the reason for ``missing`` claims."""
+    """All ``claims``. By case: the ``sizes`` [mm] of the tetrahedra in the reference and in the finer solution, and the reason for
+    ``missing`` claims.
+    """
 
     claims: tuple[Claim, ...]
     sizes: dict[str, tuple[float, float]]
@@ -59,7 +63,9 @@ class Claims:
 def claimed(
     case: str, of: Of, bars: ErrorBars, reference: tuple[Measure, ...], finer: tuple[Measure, ...]
 ) -> list[Claim]:
-    """The claims of the ``bars`` of a reference, each with the difference of its measures from a ``finer`` solution."""
+    """The claims of the ``bars`` of a reference. The errors are the differences between the measures of the ``reference`` and the
+    measures of the ``finer`` solution.
+    """
     found = []
     for metric, statistic in CLAIMED:
         bar = bars.find(of, metric, statistic)

@@ -24,10 +24,11 @@ from fem_reference.scenes.case import Case, Expectation
 
 @dataclass(frozen=True)
 class Convergence:
-    """A case on meshes of successively halved size: ``cells`` and ``errors`` by mesh, and the ``order`` on the two finest meshes.
+    """The convergence of an ``element`` on meshes whose size is halved from each mesh to the next: the ``cells`` and ``errors`` of
+    each mesh, and the ``order`` of convergence on the two finest meshes, NaN if the errors are only rounding errors.
 
-    ``against`` defines the error: the L2 distance to the exact solution, or the rms distance at the vertices from the finest
-    solution of order 2. ``order`` is NaN if the errors are only rounding.
+    ``against``: the definition of the error, in words: the L2 distance to the exact solution, or the rms distance at the vertices
+    from the finest solution of order 2.
     """
 
     element: str
@@ -39,11 +40,14 @@ class Convergence:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The runs of a case with their measures and verdicts. ``setup``: the muscle's ``Setup`` or the ``FieldProblem``.
-    ``deviations``: by candidate name, its measures against the reference. ``changes``: by run name (also ``"reference"``), its
-    measures against the rest state; for a field, which has no rest state, measures without a reference. ``extension_error`` [mm]:
-    by frame, the maximum error of fibre lengths extended from the reference's surface, None without an extension.
-    ``error_bars``: bars of the reference, None if not computed; ``ladders``: its convergence on refined meshes, if measured.
+    """The runs of a case with their measures and verdicts.
+
+    ``setup``: the ``Setup`` of a muscle, or the ``FieldProblem``. ``deviations``: the measures of each candidate against the
+    reference, by the name of the candidate. ``changes``: the measures of each run against the rest state, by the name of the run
+    (including ``"reference"``); for a field, which has no rest state, the measures that need no reference. ``extension_error``
+    [mm]: for each frame, the maximum error of fibre lengths that are extended from the reference's surface, None without an
+    extension. ``error_bars``: the error bars of the reference, None if they were not computed. ``ladders``: the convergence of the
+    reference on refined meshes, if it was measured.
     """
 
     scene: Case
@@ -60,12 +64,12 @@ class Comparison:
 
     @property
     def runs(self) -> tuple[Run, ...]:
-        """Every run, the reference first."""
+        """All runs, the reference first."""
         return (self.reference, *self.candidates)
 
     def __getitem__(self, key: tuple[str, str, str]) -> Measure:
-        """The measure of a candidate by its name, a metric and a statistic, such as ``"mine", "volume", "deviation"``; for
-        ``"reference"`` its change from rest. KeyError if there is none.
+        """The measure of a candidate, by the name of the candidate, a metric and a statistic, such as ``"mine", "volume",
+        "deviation"``. For ``"reference"`` it is the change from rest. Raises KeyError if there is no such measure.
         """
         name, metric, statistic = key
         measures = self.changes["reference"] if name == "reference" else self.deviations.get(name, ())
@@ -89,13 +93,13 @@ class Comparison:
 
     @property
     def rankings(self) -> tuple[Ranking, ...]:
-        """The order of the sound candidates, as far as the error bars separate them; empty without bars."""
+        """The rankings of the sound candidates, as far as the error bars separate them; empty without bars."""
         sound = {name: found for name, found in self.deviations.items() if name not in self.unsound}
         return rankings(sound, self.error_bars.of_deviations) if self.error_bars else ()
 
     @cached_property
     def unsound(self) -> dict[str, str]:
-        """Reasons why the frames of candidates are unusable, by name; none for fields."""
+        """The reasons why the frames of candidates are unusable, by the name of the candidate; empty for fields."""
         if "surface" not in self.reference.carries:
             return {}
         return {run.name: why for run in self.candidates if (why := unsound(run, self.reference))}
@@ -107,13 +111,13 @@ class Comparison:
 
     @property
     def word(self) -> Word:
-        """The verdict on the case, which fails if the second check denies the reference."""
+        """The verdict on the case; it is fail if the second check denies the reference."""
         if self.reference.outcome.status == "denied":
             return "fail"
         return doubted(overall(one.word for one in self.verdicts), self.doubts)
 
     def word_of(self, name: str) -> Word:
-        """The verdict on a run by its name; a reference that did not converge fails, even if it meets its expectations."""
+        """The verdict on the run ``name``. A reference that did not converge fails, even if it meets its expectations."""
         found = overall(one.word for one in self.verdicts if one.expectation.of == name)
         if name != "reference":
             return found
@@ -123,9 +127,11 @@ class Comparison:
 def compare(
     case: Case, setup: CaseSetup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
-    """Measure and judge runs of a case against the ``reference`` as the truth; only the data that a run carries are judged.
-    ``candidates`` have all frames of the case, with NaN for frames not reached. A verdict is inconclusive if the error bar extends
-    to both sides of the tolerance. InputError if the case expects a measure of a named run that has no surface to compute it from.
+    """Measure the runs of a case and judge them, with the ``reference`` as the truth.
+
+    Only the data that a run carries are judged. ``candidates`` have all frames of the case, with NaN in frames that were not
+    reached. A verdict is inconclusive if the error bar extends to both sides of the tolerance. Raises InputError if the case
+    expects a measure of a named run, and this run has no surface from which to compute it.
     """
     context, runs = metrics.context_of(setup, reference), (reference, *candidates)
     candidate, alone = metrics.names(case.standards("candidates")), metrics.names(case.standards("reference"))
@@ -153,7 +159,7 @@ def compare(
 
 
 class Alone(NamedTuple):
-    """A run without a reference: its ``measures``, the ``verdicts`` on them and their ``word``."""
+    """A run without a reference: its ``measures``, the ``verdicts`` on them, and the overall verdict ``word``."""
 
     measures: tuple[Measure, ...]
     verdicts: tuple[Verdict, ...]
@@ -161,7 +167,7 @@ class Alone(NamedTuple):
 
 
 def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
-    """The measures and verdicts of a ``run`` without a reference; none for a muscle, whose measures need a reference."""
+    """Measure and judge a ``run`` without a reference. A muscle is not judged, because its measures need a reference."""
     if "reference" in case.standards("reference"):
         return Alone((), (), "not judged")
     measures = metrics.measure(run, run, metrics.context_of(setup, run), metrics.names(case.standards("reference")))
@@ -176,7 +182,7 @@ def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> boo
 
 
 def _with_bars(measures: tuple[Measure, ...], of: Of, error_bars: ErrorBars | None) -> tuple[Measure, ...]:
-    """The ``measures``, each with its error bars if they exist."""
+    """The ``measures``, each with its error bars if these exist. ``of``: the kind of the bars, "change" or "deviation"."""
     if error_bars is None:
         return measures
     known = [(one, error_bars.find(of, one.metric, one.statistic)) for one in measures]
@@ -184,12 +190,12 @@ def _with_bars(measures: tuple[Measure, ...], of: Of, error_bars: ErrorBars | No
 
 
 def reached_frames(run: Run) -> Ints:
-    """Indices of the frames in which every coordinate of a run is a number."""
+    """Indices of the frames in which all coordinates of a run are finite."""
     return np.flatnonzero(np.isfinite(run.positions).all(axis=(1, 2)))
 
 
 def reached(comparison: Comparison) -> Comparison:
-    """The comparison without the frames that a failed reference did not reach; unchanged if it reached all frames, or none."""
+    """The comparison without frames that a failed reference did not reach; unchanged if it reached all frames, or none."""
     kept = reached_frames(comparison.reference)
     if comparison.reference.outcome.status == "converged" or len(kept) in (0, len(comparison.reference.numbers)):
         return comparison

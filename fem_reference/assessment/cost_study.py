@@ -1,4 +1,4 @@
-"""Studies of the cost of accuracy: points of error and cost by case, as shown on pages and stored in files."""
+"""Studies of the cost of accuracy: for each case, points of error and cost, as shown on pages and stored in files."""
 
 import math
 import operator
@@ -15,9 +15,10 @@ from fem_reference.foundations.records import parse
 from fem_reference.io import texts
 
 FORMAT = 1
-# The minimum and the maximum magnitude of a feature that is not 0, in its unit, and the maximum number of refinements.
+# The minimum and the maximum magnitude of a feature that is not 0, in its unit, and the maximum magnitude of the number of
+# refinements.
 _LEAST, _MOST, _FINEST = 1e-9, 1e15, 20
-# The features by which recommendations compare cases; features used as divisors are positive.
+# The features by which recommendations compare cases, and the features that must be positive because they are divisors.
 FEATURES = ("size", "triangles", "motion", "contact", "bulk_to_shear", "fibres_to_shear", "tet_size", "refinements")
 _ABOVE_ZERO = ("size", "triangles", "tet_size")
 _WANT = "a study written by the verb study"
@@ -25,10 +26,13 @@ _WANT = "a study written by the verb study"
 
 @dataclass(frozen=True, eq=False)
 class CaseStudy:
-    """The points of a case. ``units`` of errors, and ``bars``, the error bars of the truth, by ``metric.statistic``; ``truth``: a
-    description; ``claims``: error bars of coarser references, with their errors; ``triangles``: the number of surface triangles;
-    ``travel`` [mm]: the maximum displacement of the truth; ``features`` of the case, as far as its scene states them
-    (:mod:`studies.features`); ``truth_key``: the folder of the truth's run in a store, "" if it is not known.
+    """The points of a case, with their errors and costs.
+
+    ``truth``: a description of the solution from which errors are measured. ``units`` and ``bars``: the units of errors and the
+    error bars of the truth, by ``metric.statistic``. ``claims``: error bars of coarser references, with the errors of these
+    references. ``triangles``: the number of triangles of the surface. ``travel`` [mm]: the maximum displacement of the truth.
+    ``features``: features of the case, as far as its scene states them (:mod:`studies.features`). ``truth_key``: the folder of the
+    truth's run in a store, empty if it is not known.
     """
 
     case: str
@@ -45,16 +49,16 @@ class CaseStudy:
 
     @property
     def counted(self) -> tuple[Point, ...]:
-        """The points with their errors bounded below by the truth's bar, as smaller errors cannot be distinguished."""
+        """The points, with each error at least the error bar of the truth, because smaller errors cannot be distinguished."""
         return self._with_errors(max)
 
     @property
     def certain(self) -> tuple[Point, ...]:
-        """The points with upper bounds of their errors: each error plus the bar of the truth; for the truth itself its bar."""
+        """The points with upper bounds of their errors: the error plus the bar of the truth; for the truth itself its bar."""
         return self._with_errors(operator.add)
 
     def _with_errors(self, of: Callable[[float, float], float]) -> tuple[Point, ...]:
-        """The points with each error replaced by a function ``of`` error and bar; the errors of the truth are its bars."""
+        """The points with each error replaced by ``of(error, bar)``; the errors of the truth itself are its error bars."""
         names = {name for point in self.points for name in point.errors}
         own = {name: bar for name, bar in self.bars.items() if name in names}
         others = (
@@ -68,7 +72,7 @@ class CaseStudy:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Studies of cases; ``missing``: by case, the reason for its omission; ``origin``: provenance of the measurements."""
+    """Studies of ``cases``; ``missing``: by case, the reason for its omission; ``origin``: the provenance of the measurements."""
 
     cases: tuple[CaseStudy, ...]
     missing: dict[str, str] = field(default_factory=dict)
@@ -86,7 +90,7 @@ def facts(case: CaseStudy, origin: dict[str, str]) -> dict[str, Any]:
 
 
 def load(path: Path) -> list[CaseStudy]:
-    """The study of a case, or of several cases, from a file written by :func:`facts`; InputError with the invalid key."""
+    """The studies in a file written by :func:`facts`, of one case or of several cases. Raises InputError with the invalid key."""
     found = texts.read_json(path, _WANT)
     if isinstance(found, list) and found:
         return [_read(one, f"{path}: [{i}]") for i, one in enumerate(found)]
@@ -104,7 +108,7 @@ def _read(table: Any, place: str) -> CaseStudy:
 
 
 def _check(study: CaseStudy, place: str) -> None:
-    """Raise InputError below ``place`` if a study lacks a feature, or has an unknown unit or unusable points."""
+    """Raise InputError, with a key below ``place``, if a study lacks a feature, or has an unknown unit or unusable points."""
     _check_features(study, place)
     known = metrics.units()
     for name, unit in study.units.items():
@@ -119,7 +123,7 @@ def _check(study: CaseStudy, place: str) -> None:
 
 
 def _check_features(study: CaseStudy, place: str) -> None:
-    """Raise InputError below ``place`` if a study lacks a feature, or a feature has an impossible value."""
+    """Raise InputError, with a key below ``place``, if a study lacks a feature, or a feature has an impossible value."""
     for name in FEATURES:
         if name not in study.features:
             raise InputError(f"{place}: features.{name}", "nothing", "this number: run the verb study again")
@@ -133,7 +137,7 @@ def _check_features(study: CaseStudy, place: str) -> None:
 
 
 def _check_scene(scene: Any, place: str) -> None:
-    """Raise InputError if a point's changed keys of the scene are not a table, or define no valid size of tetrahedra."""
+    """Raise InputError if the scene keys that a point changes are not a table, or do not define a valid size of tetrahedra."""
     if not isinstance(scene, dict):
         raise InputError(place, repr(scene), "a table of keys")
     for key in TETRAHEDRA if {*TETRAHEDRA} & {*scene} else ():

@@ -1,4 +1,6 @@
-"""The evidence for each quantity of a muscle: closed forms, other codes, experiments, numerical bar and model band, and a grade."""
+"""The evidence for each quantity of a muscle, and a grade. The evidence consists of closed forms, other codes, experiments, the
+numerical error bar, and the band of published models.
+"""
 
 import math
 import tomllib
@@ -17,16 +19,21 @@ from fem_reference.assessment.moment_arms import ArmsBeside
 from fem_reference.foundations.records import Record, parse
 
 FILE = Path(__file__).with_suffix(".toml")
-_ROUNDED = 0.5  # the rounding of a percentage published without decimals
-_WHOLE = 100.0  # all poses, in per cent
+_ROUNDED = 0.5  # the rounding error of a percentage published without decimals
+_WHOLE = 100.0  # [%], all poses
 _READ = ("publication", "abstract", "quotation", "memory")  # kinds of text in which numbers were read, best first
 # "outside": the model differs from at least one measurement by more than its uncertainty, even if it agrees with others.
 Grade = Literal["validated", "indicative", "outside", "verified only", "not compared"]
 
 
 class Evidence(Record):
-    """The stated evidence of a quantity: ``verified``, the groups of the catalogue that verify it; ``closed_forms`` and
-    ``other_codes``, in words; the numerical ``bar``; ``band``, facts on models; ``experiments``, described in ``compared``.
+    """The stated evidence for a quantity.
+
+    ``verified``: the groups of the catalogue that verify it. ``closed_forms``, ``other_codes`` and ``bar``: closed forms,
+    comparisons with other codes and the numerical error bar, in words. ``band``: the name of the facts on differences between
+    models and real muscles; ``band_of``: a description of these differences. ``experiments``: the experiments with which the
+    quantity is compared; ``compared``: a description of these comparisons. ``arms``: True if moment arms are compared with
+    published moment arms.
     """
 
     name: str
@@ -47,16 +54,19 @@ class _File(Record):
 
 
 def claims() -> tuple[Evidence, ...]:
-    """The stated evidence, by quantity."""
+    """The stated evidence for all quantities."""
     return parse(_File, tomllib.loads(FILE.read_text(encoding="utf-8")), FILE.name).quantity
 
 
 @dataclass(frozen=True)
 class Beside:
-    """A value of the model compared with a known value, both in ``unit``. ``truth``: the known value; ``within``: its uncertainty;
-    ``n``: the number of specimens, None if unknown. ``validates``: True if agreement counts as validation. ``rests_on``: the text
-    in which the truth was read, and notes on a chosen tolerance and a recalled model. ``kind``: measurement, or model if another
-    model is the truth. ``is_order``: True for a stiffness ranking: the value is 1 if it is reproduced, else 0, the tolerance 0.5.
+    """A ``value`` of the model compared with a known value (``truth``), both in ``unit``.
+
+    ``within``: the uncertainty of the known value. ``n``: the number of specimens, None if unknown. ``met``: True if the values
+    agree. ``validates``: True if agreement counts as validation. ``rests_on``: the text in which the known value was read, with
+    notes on a tolerance that was chosen and on a recalled model. ``kind``: measurement, or model if the known value is that of
+    another model. ``is_order``: True for a ranking of stiffnesses: the value is 1 if the ranking is reproduced and 0 if it is not,
+    and the tolerance is 0.5.
     """
 
     name: str
@@ -83,8 +93,11 @@ def count(several: Iterable[Beside], kind: Kind) -> tuple[int, int]:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A quantity with its evidence: the number of verifying catalogue entries of each kind (``kinds``) and the ``orders`` that they
-    must show; the minimum and the maximum fact of its ``band``; and its comparisons with experiments (``beside``).
+    """A quantity (``claim``) with its evidence.
+
+    ``kinds``: the number of catalogue entries of each kind that verify the quantity. ``orders``: the orders of convergence that
+    these entries must show. ``band``: the facts with the minimum and the maximum difference of models. ``beside``: the comparisons
+    with experiments.
     """
 
     claim: Evidence
@@ -95,17 +108,19 @@ class Row:
 
     @property
     def measured(self) -> tuple[int, int]:
-        """The number of measurements with which the model agrees within their uncertainty, and of all measurements."""
+        """The number of measurements with which the model agrees to within their uncertainty, and the number of measurements."""
         return count(self.beside, "measurement")
 
     @property
     def models(self) -> tuple[int, int]:
-        """The number of other models within their tolerance, and of all other models, which are not evidence about muscles."""
+        """The number of other models with which the model agrees to within a tolerance, and the number of all other models.
+        Agreement with another model is not evidence about muscles.
+        """
         return count(self.beside, "model")
 
     @property
     def misses(self) -> tuple[float, ...]:
-        """The deviations from measured numbers (no rankings) divided by their uncertainties."""
+        """The deviations from measured values, divided by the uncertainties of these values. Rankings are left out."""
         measured = [one for one in self.beside if one.kind == "measurement" and not one.is_order]
         return tuple((one.value - one.truth) / one.within for one in measured)
 
@@ -121,8 +136,9 @@ class Row:
 
     @property
     def grade(self) -> Grade:
-        """The grade: "outside" if the model disagrees with any measurement, else "validated" if some comparison validates, else
-        "indicative"; "verified only" without a known experiment, "not compared" without its results. Models do not count.
+        """The grade: "outside" if the model disagrees with at least one measurement, otherwise "validated" if at least one
+        comparison validates, otherwise "indicative". Without measurements it is "not compared" if experiments are known but have no
+        results, and "verified only" if none are known. Comparisons with models do not count.
         """
         met, of = self.measured
         if of == 0:
@@ -133,7 +149,7 @@ class Row:
 
 
 def verifying(claim: Evidence, entries: Iterable[Entry]) -> list[Entry]:
-    """The ``entries`` of the catalogue that verify a ``claim``; LookupError if one of its groups does not exist."""
+    """The ``entries`` of the catalogue that verify a ``claim``. Raises LookupError if one of its groups does not exist."""
     behind = [one for one in entries if one.group in claim.verified]
     if missing := set(claim.verified) - {one.group for one in behind}:
         raise LookupError(f"{claim.name}: no group {sorted(missing)} in the catalogue")
@@ -141,9 +157,10 @@ def verifying(claim: Evidence, entries: Iterable[Entry]) -> list[Entry]:
 
 
 def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result], arms: Iterable[ArmsBeside]) -> Row:
-    """The row of a ``claim``, from all ``entries`` of the catalogue, ``results`` of experiments by name, and moment arms.
+    """The row of a ``claim``. ``entries``: all entries of the catalogue. ``results``: the results of experiments, by name.
+    ``arms``: moment arms compared with published ones.
 
-    KeyError if an experiment was not measured, LookupError if a group of the catalogue does not exist.
+    Raises KeyError if an experiment was not measured, and LookupError if a group of the catalogue does not exist.
     """
     behind = verifying(claim, entries)
     orders = {one.refinement.order for one in behind if one.refinement and one.refinement.order is not None}
@@ -154,7 +171,9 @@ def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result]
 
 
 def of_result(found: Result) -> Beside:
-    """A measured entry of the kind experiment; it validates only if all its facts do and its model is not recalled from memory."""
+    """The comparison that a measured catalogue entry of the kind "experiment" makes. It validates only if all its facts validate
+    and no part of its model is recalled from memory.
+    """
     entry = found.entry
     facts = entry.facts
     counted = not entry.from_memory and bool(facts) and all(one.validates for one in facts)
@@ -171,7 +190,7 @@ def of_result(found: Result) -> Beside:
 
 
 def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> str:
-    """The least reliable text in which ``facts`` were read, and notes on a tolerance chosen here and a recalled model."""
+    """The least reliable kind of text in which ``facts`` were read, with notes on a chosen tolerance and a recalled model."""
     read = max((one.read_in for one in facts), key=_READ.index, default="not known")
     chosen = not is_order and not (facts and all(one.sd for one in facts))
     remembered = from_memory and all(one.doi_confirmed == "yes" for one in facts)
@@ -179,8 +198,10 @@ def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> 
 
 
 def of_arms(arms: ArmsBeside) -> Beside:
-    """Moment arms compared with a measured curve, which should lie within their range in all poses, or with the range of another
-    model, which they should cover to the same percentage as the moment arms of Modenese and Kohout 2020.
+    """The comparison of moment arms with a published curve or range.
+
+    A measured curve should lie within the range of the fibres in all poses. The range of another model should be covered to the
+    same percentage as by the moment arms of Modenese and Kohout 2020.
     """
     others_reach = reached(arms)
     inside = "poses with the measured moment arm inside the fibres' range"
@@ -200,16 +221,18 @@ def of_arms(arms: ArmsBeside) -> Beside:
 
 
 def reached(arms: ArmsBeside) -> float:
-    """The percentage of poses inside, or of overlap, for the fibres of Modenese and Kohout 2020 on the same body."""
+    """The percentage for the fibres of Modenese and Kohout 2020 on the same body: of poses with the curve inside, or of overlap."""
     quantity = "share_inside" if arms.is_curve else "overlap"
     return experiments.find("modenese_kohout_2020", quantity, arms.muscle.replace("_", " ")).value
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """The best fit of a ``law`` to the quantities of cubes named in ``to``: its ``parameters`` by name, each with its published
-    range (None if none is known), and the ``values`` of all quantities by name; ``converged``: True if the fit ended at a minimum
-    of the sum of squares, False if it ran out of ``evaluations`` first.
+    """The best fit of a ``law`` to the quantities of cubes that are named in ``to``.
+
+    ``parameters``: by name, the fitted value of a parameter and its published range, None if no range is known. ``values``: the
+    values of all quantities, by name. ``converged``: True if the fit ended at a minimum of the sum of squares, False if it used up
+    its ``evaluations`` first.
     """
 
     law: str
@@ -221,14 +244,14 @@ class Fitted:
 
     @property
     def inside(self) -> bool | None:
-        """True if every parameter with a published range is inside this range; None if no parameter has one."""
+        """True if every parameter with a published range lies inside it; None if no parameter has a published range."""
         known = [low <= value <= high for value, found in self.parameters.values() if found for low, high in [found]]
         return all(known) if known else None
 
 
 @dataclass(frozen=True, eq=False)
 class Credibility:
-    """The evidence of all quantities: ``rows``; moment ``arms``, or why a case has none (``missing``); ``fits`` of laws."""
+    """The evidence for all quantities: ``rows``, moment ``arms`` (``missing``: why a case has none), and ``fits`` of laws."""
 
     rows: tuple[Row, ...]
     arms: tuple[ArmsBeside, ...]

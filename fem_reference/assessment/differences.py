@@ -1,4 +1,4 @@
-"""Sizes of differences between two runs; if a difference is small by chance, its average over frames or statistics counts."""
+"""Sizes of differences between two runs; if a difference is small by chance, its average over frames or statistics is used."""
 
 import math
 
@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from fem_reference.foundations.mesh import Floats, enclosed_volume
 from fem_reference.runs.store import Run
 
-# Prefixes of statistics that are the value at one point, each with the prefix of the average over points.
+# Prefixes of statistics that are the value at a single point, each with the prefix of the corresponding average over points.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
-_LEAST = 0.5  # averages of changes differ by at least this fraction of the runs' distance: a smaller difference is due to chance
-_MOVED = 0.01  # below this fraction of a surface's maximum motion, ratios to the motion have no meaning
+_LEAST = 0.5  # averages of changes differ by at least this fraction of the distance of the runs; less is due to chance
+_MOVED = 0.01  # if a surface has moved by less than this fraction of its maximum motion, ratios to the motion have no meaning
 
 
 def greatest(values: Floats) -> float:
@@ -21,19 +21,21 @@ def greatest(values: Floats) -> float:
 
 
 def ratio(differences: Floats, scale: Floats) -> float:
-    """The ratio of the root mean squares of ``differences`` (f,) and ``scale`` (f,), in frames with both; NaN if the scale is 0."""
+    """The rms of ``differences`` (f,) divided by the rms of ``scale`` (f,), over frames with both values; NaN for a scale of 0."""
     known = np.isfinite(differences) & np.isfinite(scale)
     squares = float(scale[known] @ scale[known])
     return math.sqrt(float(differences[known] @ differences[known]) / squares) if squares > 0 else math.nan
 
 
 def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> Floats:
-    """The size (f,) of signed ``differences`` (f,) of a statistic between two runs whose surfaces are ``apart`` (f,) [mm]: at least
-    the distance times the average ratio of difference to distance over the frames. A difference that crosses zero does not
-    show that the error is small in that frame. If the surfaces are equal, the size is that of the difference.
+    """The typical size (f,) of the signed ``differences`` (f,) of a statistic between two runs.
 
-    If the motion ``moved`` (f,) [mm] of the surfaces is given, the distance is taken to be at least the motion times the median
-    ratio of distance to motion: in some poses two meshes agree better by chance.
+    ``apart`` (f,) [mm]: the distance between the surfaces of the runs. The size is at least this distance times the average ratio
+    of difference to distance over the frames: a difference that crosses zero does not show that the error is small in that frame.
+    If the surfaces are equal, the size is the magnitude of the difference.
+
+    ``moved`` (f,) [mm]: the motion of the surfaces. If it is given, the distance is taken to be at least the motion times the
+    median ratio of distance to motion, because two meshes agree better by chance in some poses.
     """
     size = apart
     if moved is not None:
@@ -43,22 +45,26 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
 
 
 def together(parts: dict[str, Floats], there: NDArray[np.bool_]) -> tuple[Floats, dict[str, float]]:
-    """The bar (f,) of independent sources, the root sum of squares of their ``parts`` (f,), and the maximum of each part over
-    the frames ``there`` (f,), or over all frames if there are none.
+    """The error bar (f,) of independent sources of error, which is the root sum of squares of their ``parts`` (f,), and the maximum
+    of each part over the frames in which ``there`` (f,) is True, or over all frames if it is never True.
     """
     greatest = {name: float((part[there] if there.any() else part).max()) for name, part in parts.items()}
     return np.sqrt(np.sum([part**2 for part in parts.values()], axis=0)), greatest
 
 
 def typical_changes(changes: list[Floats], deviations: list[Floats], names: list[tuple[str, str]]) -> list[Floats]:
-    """The sizes (f,) of signed differences of ``changes`` (f,) from rest between two runs, by metric and statistic (``names``): at
-    least the ``deviations`` (f,) of the runs from each other times the average ratio of difference to deviation, over the frames
-    and the statistics of the metric, and at least half the deviation for averages over points.
+    """The typical sizes (f,) of differences between two runs in their changes from rest, for each metric and statistic in
+    ``names``.
 
-    By the triangle inequality, changes of the same points differ by at most their deviation. They differ by less, as most of the
-    deviation is not along the displacement, or cancels. A single statistic does not show by how much less: its difference may be
-    small by chance, especially at the worst point. A quantile or a maximum belongs to one point, whichever it is: nothing
-    cancels there, and no quantile of the deviation bounds it. So its difference is at least the rms distance over points.
+    ``changes`` (f,): the signed differences. ``deviations`` (f,): the deviations of the runs from each other. A size is at least
+    the deviation times the average ratio of difference to deviation, over the frames and over the statistics of the metric. For
+    averages over points it is at least half the deviation.
+
+    By the triangle inequality, changes of the same points differ by at most their deviation. They differ by less, because most of
+    the deviation is not along the displacement, or cancels. A single statistic does not show by how much less: its difference may
+    be small by chance, especially at the worst point. A quantile or a maximum belongs to a single point, whichever that is: nothing
+    cancels there, and no quantile of the deviation bounds the difference. So this difference is taken to be at least the rms
+    distance over the points.
     """
     metrics = [metric for metric, _ in names]
     shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]
@@ -79,10 +85,11 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
 
 
 def carried(run: Run, moved: Floats) -> dict[str, Floats]:
-    """Errors (f,) of the volume that the surface of a ``run`` encloses, by statistic. The surface is embedded in tetrahedra, and
-    lies partly outside them: the error is the difference of the changes of both volumes. Empty for a run without tetrahedra.
+    """Errors (f,) of the volume enclosed by the surface of a ``run``, by statistic; empty for a run without tetrahedra.
 
-    The error may cross zero: it is at least its average ratio to the surface's motion ``moved`` (f,) [mm] times this motion.
+    The surface is embedded in tetrahedra and lies partly outside them, so the error is the difference between the relative changes
+    of the two volumes. This difference may cross zero, so the error is at least the motion ``moved`` (f,) [mm] of the surface times
+    the average ratio of error to motion.
     """
     inside = run.scalars.get("volume_ratio")
     if inside is None:

@@ -1,9 +1,9 @@
-"""Error bars of every statistic, frame by frame, from further solutions of the reference with coarser numerics.
+"""Error bars of every statistic in each frame, from further solutions of the reference with coarser numerics.
 
 There are two kinds of bars. The bar of a candidate's deviation from the reference is the deviation of the reference's runs from
 each other: by the triangle inequality, another reference changes the candidate's deviation by at most this amount. The bar of the
-reference's change from rest is the part of these deviations by which the changes of its runs differ. The bars of a body are
-differences of its states.
+reference's change from rest is the difference between the changes of its runs, or a typical fraction of the deviation between these
+runs if this is larger. The bars of a body are differences between its states in two solutions.
 """
 
 import json
@@ -29,38 +29,41 @@ FILE = "error_bar.json"
 FORMAT = 2
 # The safety factor of a grid convergence index (Roache 1998, Verification and Validation in Computational Science, ch. 5).
 SAFETY = 1.25
-# An additional factor for a single fibre: nothing averages out, and two sizes are weaker evidence than three (for two sizes Roache
-# takes 3). It was chosen so that bars cover the differences from finer solutions (docs/error_bars.md).
+# An additional factor for a single fibre: its error is not averaged with those of other fibres, and two mesh sizes are weaker
+# evidence than three (Roache's safety factor for two sizes is 3). It was chosen so that bars cover the differences from finer
+# solutions (docs/error_bars.md).
 LONE_FIBRE = 1.2
-# The ratio of a first-order error to the change of the result when its source is halved. For the cells of a body, order 1 is the
-# lowest order away from rims of constraints, for any element (docs/error_bars.md).
+# The ratio of a first-order error to the change of the result when the source of the error is halved. For the cells of a body,
+# first order is the lowest order of convergence, with any element, away from the rims of constraints (docs/error_bars.md).
 VARIATION = 2.0
-# The order of an error in the size of tetrahedra: in general, and at the worst point. Rims of attachments, where displacement grows
-# with the square root of the distance, give order 1, or 2 with a mesh graded towards them; all other points give 2 or more. The
-# general order is in between, as runs with three sizes confirm (docs/error_bars.md).
+# The order of convergence of errors with the size of the tetrahedra, in general and at the worst point. At rims of attachments,
+# where displacement grows with the square root of the distance, the order is 1, or 2 with a mesh graded towards them; at all other
+# points it is 2 or more. The general order is in between, as runs with three sizes confirm (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
-# The relative change of a force or moment if the same springs are spread over facets instead of points of the surface:
-# 5.3 and 8.8 % of the force on the femur at 1 rad, for gluteus_medius and gluteus_maximus.
+# The relative change of a force or moment if the same springs are distributed over facets instead of points of the surface: 5.3 and
+# 8.8 % of the force on the femur at 1 rad, for gluteus_medius and gluteus_maximus.
 SPREAD = 0.09
 TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
-# Numbers as in a file, which stores None for a number that is not finite.
+# Numbers as stored in a file, in which None stands for a number that is not finite.
 _Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
 _Numbers = Annotated[
     Floats, PlainValidator(lambda values: np.array(TypeAdapter(list[_Number]).validate_python(values)))
 ]
-# By kind of bar, the differences (f,) of each statistic between two runs.
+# For each kind of bar, the differences (f,) of every statistic between two runs.
 _Differences = dict[Of, list[Floats]]
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorBar:
-    """The error bar of one statistic: its possible error due to the reference, ``values`` (f,) in ``unit``, NaN if unknown. ``of``:
-    the reference's change from rest, or a candidate's deviation from the reference. ``parts``: the maximum contribution of each
-    source over the frames.
+    """The error bar of a statistic, either ``of`` the reference's change from rest or ``of`` a candidate's deviation from the
+    reference.
 
-    ``model`` (f,): the change of the statistic under another model of spring attachments: exact attachments if these were solved,
-    and for a force or moment at least ``SPREAD`` of its value; NaN where exact attachments could not be solved, None if there are
-    no springs or no other model was solved. This is not an error of the present model, so it is not part of ``values``.
+    ``values`` (f,): the possible error of the statistic due to the reference, in ``unit``, NaN if unknown. ``parts``: the maximum
+    contribution of each source of error over the frames.
+
+    ``model`` (f,): the change of the statistic under another model of spring attachments: with exact attachments if these were
+    solved, and for a force or moment at least ``SPREAD`` of its value. NaN where exact attachments could not be solved; None
+    without springs, or if no other model was solved. This is not an error of the present model, so it is not part of ``values``.
     """
 
     of: Of
@@ -79,8 +82,8 @@ class ErrorBar:
 
 @dataclass(frozen=True, eq=False)
 class ErrorBars:
-    """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of two ``sizes`` [mm], the size of the
-    reference first, with a general ``order`` assumed for the error in the size.
+    """The error bars of a reference over frame ``numbers`` (f,). ``sizes`` [mm]: the sizes of the tetrahedra in the reference and
+    in the coarser run. ``order``: the order of convergence that is generally assumed.
     """
 
     numbers: tuple[int, ...]
@@ -89,7 +92,7 @@ class ErrorBars:
     bars: tuple[ErrorBar, ...]
 
     def find(self, of: Of, metric: str, statistic: str) -> ErrorBar | None:
-        """The bar of a statistic, ``of`` a change or a deviation; None if there is none."""
+        """The bar of a statistic's change or deviation (``of``); None if there is none."""
         wanted = (of, metric, statistic)
         return next((bar for bar in self.bars if (bar.of, bar.metric, bar.statistic) == wanted), None)
 
@@ -102,11 +105,11 @@ class ErrorBars:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Runs of the reference over the same frames: ``fine`` is the reference itself, ``coarse`` has larger tetrahedra, each of
-    ``varied`` is ``coarse`` with one source of error halved, by name, and ``exact`` has exact attachments instead of springs.
+    """Runs of the reference over the same frames: ``fine`` is the reference itself, ``coarse`` has larger tetrahedra.
 
-    ``sizes`` [mm]: the sizes of the tetrahedra; ``safety``: the ratio of bars to the expected error; ``springs``: True if any
-    attachment is by springs.
+    ``varied``: for each source of error, by name, a run like ``coarse`` with this source halved. ``exact``: a run like ``coarse``
+    with exact attachments instead of springs. ``sizes`` [mm]: the sizes of the tetrahedra in ``fine`` and ``coarse``. ``safety``:
+    the ratio of bars to the expected error. ``springs``: True if any attachment is by springs.
     """
 
     fine: Run
@@ -118,7 +121,7 @@ class Pair:
     springs: bool = False
 
     def share(self, metric: str, statistic: str) -> float:
-        """The ratio of the fine run's error to the difference of both runs, with the safety factor of a grid convergence index."""
+        """The ratio of the fine run's error bar to the difference between both runs, as in a grid convergence index."""
         stated = described()[metric, statistic]
         order = ORDER_OF_WORST if stated.local else ORDER
         safety = self.safety * (LONE_FIBRE if stated.lone else 1.0)
@@ -126,7 +129,7 @@ class Pair:
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
-    """The bars of changes and deviations, for every statistic of every metric, except metrics of a run itself, which are exact."""
+    """The error bars of changes and deviations for every statistic, except statistics of a run itself, which are exact."""
     comparing = [name for name in names() if not of_itself(name)]
     surface = cache(as_surface)
 
@@ -135,8 +138,8 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
         return change(run, context, comparing) if other is None else measure(run, other, context, comparing)
 
     def differences(run: Run, other: Run) -> _Differences:
-        """Differences of two runs: the differences of their changes from rest, each with its interior fibres, and the deviations of
-        the surface of the ``other`` run from the surface of ``run``.
+        """The differences of two runs: of their changes from rest, each with the fibres in its interior, and the deviations of the
+        surface of ``other`` from the surface of ``run``.
         """
         against_run, against_itself = (measured(surface(other), surface(one)) for one in (run, other))
         changes = _less(measured(run, None), measured(other, None))
@@ -163,8 +166,9 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
 
 
 def _model(one: Measure, exact: Floats | None, own: Floats | None) -> Floats | None:
-    """The change (f,) of the statistic ``one`` under another model of springs: under ``exact`` attachments, if solved, and for the
-    reference's ``own`` force or moment also with springs that are distributed differently.
+    """The change (f,) of the statistic ``one`` under another model of springs. ``exact`` (f,): its change with exact attachments,
+    if solved. ``own`` (f,): its value in the reference; a force or moment also changes with springs that are distributed
+    differently.
     """
     forces = one.metric == "joint_moment" and one.statistic != "arm"
     spread = SPREAD * np.abs(own) if forces and own is not None else None
@@ -173,7 +177,7 @@ def _model(one: Measure, exact: Floats | None, own: Floats | None) -> Floats | N
 
 
 def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Floats | None = None) -> _Differences:
-    """The sizes of the signed ``differences`` of ``statistics`` between two runs whose surfaces have ``moved`` (f,) [mm]."""
+    """The typical sizes of ``differences`` between two runs, by statistic. ``moved`` (f,) [mm]: the motion of the surfaces."""
     apart = _rms_of_surface(statistics, differences["deviation"])
     deviations = [typical(found, apart, moved) for found in differences["deviation"]]
     kinds = [(one.metric, one.statistic) for one in statistics]
@@ -186,8 +190,9 @@ def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Fl
 def _averaged(
     sizes: list[Floats], kinds: list[tuple[str, str]], spreads: dict[tuple[str, str], Floats]
 ) -> list[Floats]:
-    """The ``sizes`` (f,) of differences by metric and statistic; for a signed mean over fibres at least the root mean square of
-    their deviations, given in ``spreads``: errors of neighbouring fibres are similar, and cancel in a pair of runs only by chance.
+    """The ``sizes`` (f,) of differences by metric and statistic (``kinds``). For a signed mean over fibres the size is at least the
+    rms of the fibres' deviations in ``spreads``: errors of neighbouring fibres are similar, and cancel between two runs only by
+    chance.
     """
     found = []
     for size, (metric, statistic) in zip(sizes, kinds, strict=True):
@@ -198,7 +203,7 @@ def _averaged(
 
 
 def _pooled(sizes: list[Floats], kinds: list[tuple[str, str]]) -> list[Floats]:
-    """The ``sizes`` (f,) of differences by metric and statistic; for pooled statistics at least their rms over the metric."""
+    """The ``sizes`` (f,) of differences by metric and statistic (``kinds``); for pooled statistics at least their rms."""
     pooled: dict[str, list[Floats]] = {}
     for size, kind in zip(sizes, kinds, strict=True):
         if described()[kind].pooled:
@@ -208,23 +213,23 @@ def _pooled(sizes: list[Floats], kinds: list[tuple[str, str]]) -> list[Floats]:
 
 
 def _rms_of_surface(statistics: tuple[Measure, ...], values: list[Floats]) -> Floats:
-    """The surface distance, rms (f,) [mm], among the ``values`` by statistic."""
+    """The rms distance (f,) [mm] of the surface, taken from the ``values`` of all ``statistics``."""
     return values[[(one.metric, one.statistic) for one in statistics].index(("surface_deviation", "rms"))]
 
 
 def _less(measures: tuple[Measure, ...], others: tuple[Measure, ...]) -> list[Floats]:
-    """The values (f,) of ``measures`` minus the values of ``others``, by statistic."""
+    """The values (f,) of ``measures`` minus the values of ``others``, for each statistic."""
     return [one.values - other.values for one, other in zip(measures, others, strict=True)]
 
 
 def save(bars: ErrorBars, folder: Path, of: dict[str, str]) -> None:
-    """Store the error ``bars`` in the ``folder`` of their run; :func:`load` reads them only for the same ``of``."""
+    """Store the error ``bars`` in the ``folder`` of their run. ``of``: the run and a hash of the metrics that measured it."""
     table = {"format": FORMAT, "of": of, "numbers": bars.numbers, "sizes_mm": bars.sizes, "order": bars.order}
     files.write_text(folder / FILE, json.dumps(plain(table | {"bars": bars.bars}), indent=1, allow_nan=False))
 
 
 def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
-    """The bars stored in ``folder``; None if there are none that match ``of``, InputError if the file is damaged."""
+    """The bars stored in ``folder``; None without bars for the run and metrics in ``of``. InputError if the file is damaged."""
     place = folder / FILE
     if not place.exists():
         return None
@@ -243,10 +248,11 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
 
 @dataclass(frozen=True, eq=False)
 class BodyBars:
-    """Error bars of a body at ``frames`` (f,): distances from its states in the limit of fine cells. ``points`` (f, n)
-    [mm], ``energy`` (f,) [N mm], and by name of each constraint or bone the vectors ``forces`` (f,) [N] and ``moments`` (f,)
-    [N mm]; NaN if unknown. ``displacement`` (f,): the bar of the displacement divided by the displacement, both rms over the nodes.
-    ``sharper``: the more accurate solution, in words.
+    """Error bars of a body at ``frames`` (f,): distances from its states in the limit of fine cells, NaN if unknown.
+
+    ``points`` (f, n) [mm]: bars of the positions. ``energy`` (f,) [N mm]: bars of the energy. ``forces`` (f,) [N] and ``moments``
+    (f,) [N mm]: for each constraint or bone, by name, the magnitude of the bar of the vector. ``displacement`` (f,): the bar of the
+    displacement divided by the displacement, both rms over the nodes. ``sharper``: the more accurate solution, in words.
     """
 
     frames: tuple[float, ...]
@@ -259,9 +265,10 @@ class BodyBars:
 
 
 def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints, sharper: str) -> BodyBars:
-    """The bars of the ``states`` of a body, the rest state first, from the ``finer`` states of a more accurate solution, which may
-    be fewer. ``shared`` (n,): the number of each point of the body in that solution, -1 for a missing point; ``sharper``: its
-    differences in numerics, in words.
+    """The error bars of the ``states`` of a body, the rest state first.
+
+    ``finer``: the states of a more accurate solution, which may have stopped earlier. ``shared`` (n,): the index of each point of
+    the body in that solution, -1 for a missing point. ``sharper``: the differences in numerics, in words.
     """
     there = {state.number: state for state in finer}
     pairs = [(state, _beside(state, there.get(state.number), shared)) for state in states]
@@ -282,7 +289,7 @@ def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints,
 
 
 def _beside(state: Frame, other: Frame | None, shared: Ints) -> Frame:
-    """The ``other`` state at the points of ``state``, NaN for missing points or if it was not reached."""
+    """The ``other`` state at the points of ``state``; NaN at missing points, and everywhere if there is no other state."""
     if other is None:
         lost = np.full(3, np.nan)
         blank: dict[str, Any] = {kind: dict.fromkeys(getattr(state, kind), lost) for kind in ("forces", "moments")}

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class CurveError:
-    """A ``technique`` through ``known`` points of each fibre: distances [mm] of other points from its curve, rms and maximum."""
+    """The error of a ``technique`` that draws a curve through ``known`` points of each fibre: the rms and the maximum
+    (``greatest``) distance [mm] of the other points from the curve.
+    """
 
     case: str
     technique: str
@@ -16,8 +18,10 @@ class CurveError:
 
 @dataclass(frozen=True)
 class HeightError:
-    """A fit by Gaussians to the heights, above its plane, of every second vertex of an attached area: the number of ``centres``,
-    the ``choice`` of their positions, the rms error [mm] at the other vertices, and the ``condition`` number of the matrix.
+    """The error of a fit by Gaussians to the heights of an attached area above its plane, at every second vertex.
+
+    ``centres``: the number of Gaussians. ``choice``: the method by which their positions are chosen. ``rms``: the error [mm] at the
+    other vertices. ``condition``: the condition number of the matrix.
     """
 
     case: str
@@ -30,7 +34,9 @@ class HeightError:
 
 @dataclass(frozen=True)
 class FitError:
-    """A muscle's surface of ``vertices`` fitted by ``gaussians``: rms and maximum distance of vertices [mm], ratio of volumes."""
+    """The error of a fit by ``gaussians`` to the surface of a muscle with ``vertices``: the rms and the maximum (``greatest``)
+    distance of the vertices [mm], and the ratio of the volumes (``volume``).
+    """
 
     case: str
     vertices: int
@@ -41,14 +47,17 @@ class FitError:
 
     @property
     def fewer(self) -> float:
-        """The ratio of the count of numbers that define the vertices to the count that define the Gaussians."""
+        """The number of values that define the vertices, divided by the number of values that define the Gaussians."""
         return 3 * self.vertices / (4 * self.gaussians)
 
 
 @dataclass(frozen=True)
 class DecompositionError:
-    """Fibres of a ``source`` compared with the fibres of ``against``: the angle between them [degrees], median and 95th percentile,
-    the ratio of their mean lengths, the fraction of points ``outside`` the muscle, and the number of pairs of fibres that cross.
+    """Fibres of a ``source`` compared with the fibres of another source (``against``).
+
+    ``median`` and ``most``: the median and the 95th percentile of the angle between the fibres [degrees]. ``length``: the ratio of
+    the mean lengths. ``outside``: the fraction of points outside the muscle. ``crossings``: the number of pairs of fibres that
+    cross.
     """
 
     case: str
@@ -63,8 +72,9 @@ class DecompositionError:
 
 @dataclass(frozen=True)
 class RodError:
-    """A muscle as ``rods`` of one ``radius`` [mm] along its fibres, with the muscle's volume in total, as in ``viper`` at rest: the
-    fraction of the muscle that is ``filled``, and the fractions of the rods that are ``outside`` it or ``overlap``.
+    """The error of representing a muscle by ``rods`` of one ``radius`` [mm] along its fibres, which together have the volume of the
+    muscle, as in ``viper`` at rest. ``filled``: the fraction of the muscle that is filled. ``outside`` and ``overlap``: the
+    fractions of the rods that lie outside the muscle and that overlap.
     """
 
     case: str
@@ -77,8 +87,10 @@ class RodError:
 
 @dataclass(frozen=True)
 class AnswerChange:
-    """The change of the reference's result with fibres of a ``source`` instead of ``against``: the maximum change over the frames
-    by ``metric.statistic``, empty if a solution is missing (``status``); ``bars``: the error bars of the result.
+    """The change of the reference's result if fibres of ``source`` replace fibres of ``against``.
+
+    ``changes``: by ``metric.statistic``, the maximum change over the frames; empty if a solution is missing, with the reason in
+    ``status``. ``bars``: the error bars of the result.
     """
 
     case: str
@@ -91,7 +103,7 @@ class AnswerChange:
 
 @dataclass(frozen=True)
 class Estimation:
-    """The errors of all techniques; ``missing``: by case, the reason for its omission; ``answers``, if requested."""
+    """The errors of all techniques; ``missing``: by case, why it was left out; ``answers``: changes of results, if requested."""
 
     curves: tuple[CurveError, ...]
     heights: tuple[HeightError, ...]

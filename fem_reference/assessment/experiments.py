@@ -1,4 +1,4 @@
-"""Measured muscles: facts from publications with their uncertainty and origin, and the record of each experiment."""
+"""Measurements of real muscles: facts from publications with their uncertainty and origin, and a record of each experiment."""
 
 import csv
 import math
@@ -22,8 +22,8 @@ _Text = Annotated[str, StringConstraints(min_length=1)]
 
 
 class Fact(Record):
-    """A measured number: ``value`` in ``unit``, its standard deviation ``sd`` over ``n`` specimens if known, the method by which it
-    was taken from the publication (``how``), and the kind of text in which it was read (``read_in``).
+    """A measured number from a publication: its ``value`` in ``unit``, and its standard deviation ``sd`` over ``n`` specimens, if
+    known. ``how``: the method by which it was taken from the publication. ``read_in``: the kind of text in which it was read.
     """
 
     experiment: str
@@ -40,15 +40,19 @@ class Fact(Record):
 
     @property
     def validates(self) -> bool:
-        """True if it was read in the publication or its abstract and has a standard deviation over several specimens."""
+        """True if the number was read in the publication or its abstract (neither fitted nor recalled), and has a standard
+        deviation over several specimens.
+        """
         read = self.read_in in ("publication", "abstract") and self.how not in ("fit", "memory")
         return read and self.sd is not None and (self.n or 0) > 1
 
 
 class Experiment(Record):
-    """An experiment of a ``kind`` (measurement, model, or bands from several publications), with its ``specimen``, its ``boundary``
-    conditions, and the parts of it that a scene repeats (``repeated``) or does not repeat (``not_repeated``). ``file``: a full
-    curve, in the folder that the environment variable ``FEM_REFERENCE_DATA`` names.
+    """An experiment of a ``kind``: a measurement, a model, or bands from several publications.
+
+    ``specimen`` and ``boundary``: the specimen and the boundary conditions. ``repeated`` and ``not_repeated``: the parts of the
+    experiment that a scene repeats, and those that it does not repeat. ``file``: a full curve, in the folder that the environment
+    variable ``FEM_REFERENCE_DATA`` names.
     """
 
     title: _Text
@@ -62,7 +66,7 @@ class Experiment(Record):
 
 
 def facts(folder: Path = FOLDER) -> Iterator[Fact]:
-    """Every measured number of a ``folder``; InputError, with the line, if a row is incomplete or invalid."""
+    """All measured numbers of a ``folder``. Raises InputError, with the line, if a row is incomplete or invalid."""
     with (folder / NAME).open(encoding="utf-8", newline="") as file:
         for line, row in enumerate(csv.DictReader(file, strict=True), 2):
             yield _fact(row, f"{NAME}:{line}")
@@ -81,7 +85,7 @@ def _fact(row: dict[str, str], place: str) -> Fact:
 
 
 def experiments(folder: Path = FOLDER) -> dict[str, Experiment]:
-    """The record of each experiment of a ``folder``, by name."""
+    """The records of all experiments of a ``folder``, by name."""
     paths = sorted(folder.glob("*.toml"))
     return {path.stem: parse(Experiment, tomllib.loads(path.read_text(encoding="utf-8")), path.name) for path in paths}
 
@@ -92,7 +96,9 @@ def _own() -> tuple[Fact, ...]:
 
 
 def find(experiment: str, quantity: str, condition: str) -> Fact:
-    """The one fact of an ``experiment`` and ``quantity`` whose condition contains the text ``condition``; else LookupError."""
+    """The only fact of an ``experiment`` and ``quantity`` whose condition contains ``condition``; LookupError if not exactly one
+    fits.
+    """
     found = [
         one for one in _own() if (one.experiment, one.quantity) == (experiment, quantity) and condition in one.condition
     ]
@@ -107,13 +113,13 @@ def model_band(quantity: str = "mean_surface_distance") -> tuple[Fact, ...]:
 
 
 def ratio(upper: Fact, lower: Fact) -> tuple[float, float]:
-    """The ratio of two independent facts, and its standard deviation, NaN if either fact has none."""
+    """The ratio of two independent facts, and its standard deviation, which is NaN if either fact has none."""
     value = upper.value / lower.value
     parts = [math.nan if one.sd is None else one.sd / one.value for one in (upper, lower)]
     return value, abs(value) * math.hypot(*parts)
 
 
 def least_specimens(several: Iterable[Fact]) -> int | None:
-    """The least number of specimens of ``several`` facts; None if any is unknown or there are no facts."""
+    """The smallest number of specimens among ``several`` facts; None if any number is unknown or there are no facts."""
     counts = [one.n for one in several]
     return None if None in counts or not counts else min(one for one in counts if one is not None)

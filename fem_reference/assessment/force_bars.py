@@ -1,7 +1,7 @@
-"""Error bars of the force on each bone and of its moment about the origin, as lengths of vectors.
+"""Error bars of the force on each bone and of its moment about the origin, as magnitudes of vectors.
 
-The rule is the same as for ``joint_moment``. The difference of two runs is the length of the difference of their vectors, so the
-bar is not too short where a component crosses zero. Two bones between which a muscle is in balance have the same bars.
+The rule is the same as for ``joint_moment``. The difference between two runs is the magnitude of the difference of their vectors,
+so the bar is not too short where a component crosses zero. Two bones between which a muscle is in balance have the same bars.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ _UNITS = {"force": "N", "moment": "N mm"}
 
 
 def force_bars(pair: Pair, context: MeasurementContext) -> tuple[ErrorBar, ...]:
-    """The bars of ``force_on_bone`` and ``moment_on_bone`` of the reference, by bone; none if no force is known."""
+    """The error bars of ``force_on_bone`` and ``moment_on_bone`` of the reference, for each bone; empty if no force is known."""
     moved = _apart(at_rest(pair.fine), pair.fine, context)
     others = {TETRAHEDRA: (pair.coarse, pair.fine)} | {name: (run, pair.coarse) for name, run in pair.varied.items()}
     apart = {name: _apart(*runs, context) for name, runs in others.items()}
@@ -30,7 +30,8 @@ def force_bars(pair: Pair, context: MeasurementContext) -> tuple[ErrorBar, ...]:
                 size = _length(kind, bone, *runs)
                 parts[name] = left[name] * typical(size, apart[name], moved if name == TETRAHEDRA else None)
             bar = together(parts, np.ones(len(moved), bool))
-            # The changes due to springs distributed differently, and due to exact attachments, of this muscle or of a neighbour.
+            # The change if the springs of this muscle are distributed differently, and the change with exact attachments of this
+            # muscle or of a neighbour.
             known = [SPREAD * _length(kind, bone, pair.fine)] if pair.springs else []
             known += [] if pair.exact is None else [_length(kind, bone, pair.exact, pair.coarse)]
             model = np.maximum.reduce(known) if known else None
@@ -39,12 +40,12 @@ def force_bars(pair: Pair, context: MeasurementContext) -> tuple[ErrorBar, ...]:
 
 
 def _apart(run: Run, other: Run, context: MeasurementContext) -> Floats:
-    """The distance (f,) [mm] of the surfaces of two runs, rms."""
+    """The rms distance (f,) [mm] between the surfaces of two runs."""
     found = measure(as_surface(run), as_surface(other), context, ["surface_deviation"])
     return next(one.values for one in found if one.statistic == "rms")
 
 
 def _length(kind: str, bone: str, run: Run, other: Run | None = None) -> Floats:
-    """The length (f,) of the force or moment on a ``bone``, or of its difference from an ``other`` run."""
+    """The magnitude (f,) of the force or moment on a ``bone`` in a ``run``, or of its difference from that in an ``other`` run."""
     vectors = [one.force(bone) if kind == "force" else one.moment(bone) for one in (run, other) if one is not None]
     return np.asarray(np.linalg.norm(vectors[0] - (vectors[1] if other else 0.0), axis=1))

@@ -1,6 +1,6 @@
-"""Fronts of accuracy against cost: points of measured settings that no other point beats, and the price of half the error.
+"""Fronts of accuracy against cost: the measured settings that no other setting beats, and the cost of halving the error.
 
-Solvers are compared at the same error or the same cost, never at the same settings (work-precision diagrams: Hairer, Norsett,
+Solvers are compared at the same error or at the same cost, never at the same settings (work-precision diagrams: Hairer, Norsett,
 Wanner 1993, Solving Ordinary Differential Equations I, II.10).
 """
 
@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-# The costs of a point: by name a title and its unit. The first is the default.
+# The costs of a point: by name, a title and a unit. The first cost is the default.
 COSTS: dict[str, tuple[str, str]] = {
     "seconds_per_frame": ("time of a frame", "s"),
     "seconds": ("total time, with set-up", "s"),
@@ -25,21 +25,24 @@ COSTS: dict[str, tuple[str, str]] = {
     "projections": ("projections of a constraint", ""),
     "peak_memory_mb": ("peak memory", "MB"),
 }
-# The name of the cost that states the fraction of the machine used by other processes, and the fraction that slows a run.
+# The name of the cost that states the fraction of the machine that other processes use, and the fraction that slows a run down.
 LOAD, LOADED = "load_by_others", 0.1
 # The keys of a scene that define its tetrahedra.
 TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
 # The type of an error, a bar or a cost.
 Amount = Annotated[float, Field(ge=0, le=1e15, allow_inf_nan=False)]
-# A slope needs at least this many points, whose errors span at least this factor.
+# A slope is computed only from at least this many points, whose errors must span more than this factor.
 _LEAST_POINTS, _LEAST_SPAN = 2, 1.3
 
 
 @dataclass(frozen=True)
 class Point:
-    """A ``solver`` with settings, run on a ``case``: the varied key (``knob``, "" for the settings of the case or the default) and
-    its ``value`` as text; ``choice``: everything needed to repeat it; ``status``, ``message``: its outcome. ``errors``: maximum
-    deviations from the truth by ``metric.statistic``; ``costs``: the known costs of ``COSTS`` by name, and seconds by phase.
+    """A run of a ``solver`` with certain settings on a ``case``.
+
+    ``knob`` and ``value``: the key that was varied ("" for the settings of the case or the defaults) and its value as text.
+    ``choice``: everything that is needed to repeat the run. ``status`` and ``message``: the outcome. ``errors``: the maximum
+    deviations from the truth, by ``metric.statistic``. ``costs``: the known costs of ``COSTS`` by name, and the seconds of each
+    phase.
     """
 
     case: str
@@ -55,12 +58,12 @@ class Point:
 
     @property
     def is_default(self) -> bool:
-        """True if nothing was varied."""
+        """True if no setting was varied."""
         return not self.knob
 
     @property
     def is_truth(self) -> bool:
-        """True for the reference of the case, against which all others are measured."""
+        """True for the reference of the case, from which the errors of all other points are measured."""
         return self.name == "reference" and self.is_default
 
     @property
@@ -71,17 +74,17 @@ class Point:
 
     @property
     def load(self) -> float:
-        """The fraction of the machine that other processes kept busy during its run; NaN if it is unknown."""
+        """The fraction of the machine that other processes used during the run; NaN if it is unknown."""
         return self.costs.get(LOAD, math.nan)
 
     def at(self, error: str, cost: str) -> tuple[float, float] | None:
-        """The error and the cost of a converged point; None if either is unknown or not positive, or the point did not converge."""
+        """The error and the cost of a converged point; None if it did not converge, or if either is unknown or not positive."""
         pair = self.errors.get(error, math.nan), self.costs.get(cost, math.nan)
         return pair if self.status == "converged" and min(pair) > 0 and all(map(math.isfinite, pair)) else None
 
 
 def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
-    """The points that no cheaper point beats in error, the cheapest first."""
+    """The points whose error is smaller than that of every cheaper point, the cheapest first."""
     known = [(pair[1], pair[0], i, point) for i, point in enumerate(points) if (pair := point.at(error, cost))]
     found, best = list[Point](), math.inf
     for _, value, _, point in sorted(known):
@@ -93,9 +96,11 @@ def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
 
 @dataclass(frozen=True)
 class Price:
-    """The price of accuracy of a ``solver``: ``factor``, by which the cost on its front grows if the error is
-    halved, NaN if more cost does not reduce the error; the ``best`` and ``worst`` errors of the front, which has ``count`` points;
-    ``nearest``: the point with the best error.
+    """The price of accuracy with a ``solver``.
+
+    ``factor``: the factor by which the cost on the front grows if the error is halved, NaN if more cost does not reduce the error.
+    ``best`` and ``worst``: the smallest and the largest error on the front, which has ``count`` points. ``nearest``: the point with
+    the smallest error.
     """
 
     solver: str
@@ -107,12 +112,12 @@ class Price:
 
     @property
     def is_measured(self) -> bool:
-        """True if the errors of the front span a factor of two, so that :attr:`factor` is not extrapolated."""
+        """True if the errors of the front span a factor of two, so that :attr:`factor` is not an extrapolation."""
         return self.worst >= 2 * self.best
 
 
 def price(points: Iterable[Point], solver: str, error: str, cost: str) -> Price | None:
-    """The price of a ``solver``: a line through its front in logarithms, by least squares; None if it is unknown."""
+    """The price of accuracy with a ``solver``, from a least-squares line through its front in logarithms; None without points."""
     front = pareto((point for point in points if point.solver == solver), error, cost)
     pairs = [pair for point in front if (pair := point.at(error, cost))]
     if not pairs:
@@ -126,13 +131,13 @@ def price(points: Iterable[Point], solver: str, error: str, cost: str) -> Price 
 
 
 def solvers(points: Iterable[Point]) -> tuple[str, ...]:
-    """The solvers of the points, in order."""
+    """The solvers of the points, in order of appearance."""
     return tuple(dict.fromkeys(point.solver for point in points))
 
 
 @dataclass(frozen=True)
 class Match:
-    """The best points, at most one of each solver, at the ``same`` cost or error of at most ``at``; the best of all first."""
+    """The best point of each solver whose error or cost (``same``) is at most ``at``; the best of all comes first."""
 
     same: str
     at: float
@@ -140,7 +145,9 @@ class Match:
 
 
 def match(points: Iterable[Point], error: str, cost: str, *, same: str, at: float) -> Match:
-    """The best point of each solver whose error or cost ``same`` is at most ``at``; ties go to the least ``same``."""
+    """The best point of each solver among the points whose error or cost (``same``) is at most ``at``. Of equally good points, the
+    point with the smallest ``same`` is taken.
+    """
     i = 0 if same == error else 1
     known = [(pair, point) for point in points if (pair := point.at(error, cost)) and pair[i] <= at]
     best = dict[str, Point]()
@@ -150,7 +157,9 @@ def match(points: Iterable[Point], error: str, cost: str, *, same: str, at: floa
 
 
 def levels(points: Iterable[Point], error: str, cost: str, *, same: str, count: int = 5) -> tuple[float, ...]:
-    """Some errors or costs ``same`` at which points can be compared, over their range: 1, 2 or 5 times a power of ten."""
+    """Errors or costs (``same``) at which points can be compared, over the range of the points: at most ``count`` values, each 1, 2
+    or 5 times a power of ten.
+    """
     values = [pair[0 if same == error else 1] for point in points if (pair := point.at(error, cost))]
     if not values:
         return ()

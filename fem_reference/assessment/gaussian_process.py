@@ -1,9 +1,9 @@
-"""A Gaussian process: an approximation to a function of a few uniform variables from its values in runs, and its sensitivities.
+"""A Gaussian process: an approximation to a function of a few uniform variables, from its values in runs, and its sensitivities.
 
-The process has a linear trend and a squared exponential covariance with a length scale for each variable. The lengths and the noise
-maximise the profile likelihood (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sections 2.7 and 5.4.1), with
-the optimal trend and one optimal variance of all outputs. Sobol's indices are estimated by sampling: first-order indices as in
-Saltelli et al. 2010 (doi 10.1016/j.cpc.2009.09.018), total indices as in Jansen 1999.
+The process has a linear trend and a squared exponential covariance with a length scale for each variable. The length scales and the
+noise maximise the profile likelihood (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sections 2.7 and
+5.4.1), with the optimal trend and one optimal variance for all outputs. Sobol's indices are estimated by sampling: first-order
+indices as in Saltelli et al. 2010 (doi 10.1016/j.cpc.2009.09.018), total indices as in Jansen 1999.
 """
 
 from dataclasses import dataclass, replace
@@ -16,19 +16,20 @@ from scipy.spatial.distance import cdist
 
 from fem_reference.foundations.mesh import Floats
 
-_GROUPS = 10  # the number of groups of runs, each left out in turn
-_LENGTHS, _NOISE = (0.2, 40.0), (1e-10, 0.1)  # limits; the noise is in variances about the trend
+_GROUPS = 10  # the number of groups of runs; each group is left out in turn
+_LENGTHS, _NOISE = (0.2, 40.0), (1e-10, 0.1)  # limits; the noise is relative to the variance about the trend
 _START = 1.0, 1e-4
-_LEAST = 1e-24  # the least variance about the trend, as a fraction of the outputs' squares: the trend may reproduce them exactly
+_LEAST = 1e-24  # the minimum variance about the trend, as a fraction of the squared outputs, which the trend may reproduce exactly
 _SAMPLES = 13  # the number of samples, as a power of 2
 
 
 @dataclass(frozen=True, eq=False)
 class GaussianProcess:
-    """The process through outputs (n, q) at ``points`` (n, d) from -1 to 1: logarithms of the length of each variable and of the
-    noise (``logs`` (d + 1,)), the ``trend`` (1 + d, q) and the ``weights`` (n, q) of the points.
+    """The process through outputs (n, q) at ``points`` (n, d) with coordinates from -1 to 1.
 
-    ``error``: the mean square error at runs left out of all fits, also of lengths and noise, relative to the outputs' variance.
+    ``logs`` (d + 1,): the logarithms of the length scale of each variable and of the noise. ``trend`` (1 + d, q): the coefficients
+    of the linear trend. ``weights`` (n, q): the weights of the points. ``error``: the mean square error at runs that were left out
+    of all fits, including those of length scales and noise, relative to the variance of the outputs.
     """
 
     points: Floats
@@ -48,12 +49,12 @@ class GaussianProcess:
 
     @property
     def total(self) -> Floats:
-        """The fraction (d,) of the variance due to each variable, alone and with others."""
+        """The fraction (d,) of the variance due to each variable, alone and together with other variables."""
         return np.asarray(self._shares[1])
 
     @cached_property
     def _shares(self) -> Floats:
-        """Both fractions (2, d), from samples of pairs of independent points between which one variable at a time is exchanged."""
+        """Both fractions (2, d), from samples of pairs of independent points; one variable at a time is exchanged between them."""
         from scipy.stats import qmc  # importing takes half a second, and few processes need it
 
         variables = self.points.shape[1]
@@ -68,7 +69,8 @@ class GaussianProcess:
 
 
 def fit(points: Floats, outputs: Floats) -> GaussianProcess | None:
-    """The process of ``outputs`` (n, q) at ``points`` (n, d) from -1 to 1, with its error; None if the outputs do not vary.
+    """Fit a process to ``outputs`` (n, q) at ``points`` (n, d) from -1 to 1, and measure its error. Returns None if the outputs do
+    not vary.
 
     >>> points = np.linspace(-1, 1, 12)[:, None]
     >>> float(fit(points, np.sin(3 * points))(np.array([[0.5]]))[0, 0].round(3))
@@ -90,14 +92,14 @@ def fit(points: Floats, outputs: Floats) -> GaussianProcess | None:
 
 
 def _fitted(points: Floats, outputs: Floats, start: Floats) -> GaussianProcess:
-    """The process of maximum likelihood near the logarithms ``start`` (d + 1,)."""
+    """The process of maximum likelihood, searched for from the logarithms ``start`` (d + 1,)."""
     bounds = [tuple(np.log(_LENGTHS))] * points.shape[1] + [tuple(np.log(_NOISE))]
     found = minimize(_unlikely, start, (points, outputs), jac=True, method="L-BFGS-B", bounds=bounds).x
     return GaussianProcess(points, found, *_solved(points, outputs, found)[:2])
 
 
 def _unlikely(logs: Floats, points: Floats, outputs: Floats) -> tuple[float, Floats]:
-    """The negative logarithm of the likelihood, up to a constant, and its slopes (d + 1,)."""
+    """The negative logarithm of the likelihood, up to a constant, and its derivatives (d + 1,) with respect to ``logs``."""
     trend, weights, factor = _solved(points, outputs, logs)
     squares = max(float(((outputs - _terms(points) @ trend) * weights).sum()), _LEAST * float((outputs**2).sum()))
     value = np.log(np.diag(factor[0])).sum() + len(points) / 2 * np.log(squares)
@@ -108,7 +110,7 @@ def _unlikely(logs: Floats, points: Floats, outputs: Floats) -> tuple[float, Flo
 
 
 def _solved(points: Floats, outputs: Floats, logs: Floats) -> tuple[Floats, Floats, tuple[Floats, bool]]:
-    """The best trend (1 + d, q), the weights (n, q) and the factor of the covariance of the points."""
+    """The optimal trend (1 + d, q), the weights (n, q), and the Cholesky factor of the covariance of the points."""
     factor = cho_factor(_covariance(points, points, logs) + np.exp(logs[-1]) * np.eye(len(points)), lower=True)
     terms = _terms(points)
     trend = np.linalg.solve(terms.T @ cho_solve(factor, terms), terms.T @ cho_solve(factor, outputs))
@@ -116,11 +118,11 @@ def _solved(points: Floats, outputs: Floats, logs: Floats) -> tuple[Floats, Floa
 
 
 def _covariance(points: Floats, others: Floats, logs: Floats) -> Floats:
-    """The covariance (m, n) of ``points`` (m, d) with ``others`` (n, d), without noise."""
+    """The covariance (m, n) between ``points`` (m, d) and ``others`` (n, d), without noise."""
     lengths = np.exp(logs[:-1])
     return np.asarray(np.exp(-cdist(points / lengths, others / lengths, "sqeuclidean") / 2))
 
 
 def _terms(points: Floats) -> Floats:
-    """The terms (m, 1 + d) of the trend."""
+    """The terms (m, 1 + d) of the trend at ``points`` (m, d): 1 and the coordinates."""
     return np.column_stack([np.ones(len(points)), points])

@@ -1,4 +1,4 @@
-"""Quantities that show whether a run is stable, by frame and with the worst point."""
+"""Quantities that show whether a run is stable: values for each frame, with the worst point."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,12 +21,15 @@ from fem_reference.problems.setup import Bone
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """A run whose health is measured. ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame
-    ``numbers``; for a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3). ``bones``: bones with which ``free``
-    (n,) vertices may be in contact. ``truth`` (f, n, 3): the same vertices in the reference, if it has them. ``integrated`` (f,),
-    for several bodies (f, b): V/V0 from the solver. If known: numbers of ``negative_modes`` (f,) and ``material_modes`` (f,), those
-    certainly due to the material, and ``least_determinant`` (f,), the least det F. For a scalar field its ``values`` (f, N) and
-    the ``range`` of its boundary values. ``spans``: the slices of arrays that belong to each of several bodies.
+    """A run whose health is measured.
+
+    ``surface``: the surface at rest. ``positions`` (f, n, 3) [mm]: the positions of its vertices at frame ``numbers``. ``mesh`` and
+    ``nodes`` (f, k, 3) [mm]: for a solver with tetrahedra, the mesh at rest and the positions of its nodes. ``bones``: the bones
+    with which ``free`` (n,) vertices may be in contact. ``truth`` (f, n, 3) [mm]: the positions of the same vertices in the
+    reference. ``integrated`` (f,), or (f, b) for several bodies: V/V0 from the solver. ``negative_modes`` (f,): the number of
+    negative modes. ``material_modes`` (f,): the number of those that are certainly due to the material. ``least_determinant`` (f,):
+    the smallest det F. ``values`` (f, N) and ``range``: the values of a scalar field, and the range of its boundary values.
+    ``spans``: the slices of the arrays that belong to each of several bodies. Data that are not known are None.
     """
 
     numbers: tuple[int, ...]
@@ -51,7 +54,7 @@ class Followed:
         return tuple(self._of(i, span) for i, span in enumerate(self.spans)) or (self,)
 
     def _of(self, i: int, span: Span) -> "Followed":
-        """The surface, the tetrahedra and the volume of body number ``i``, from its ``span``."""
+        """The run of body ``i`` alone, with the surface, the tetrahedra and the volume in its ``span``."""
         integrated = None if self.integrated is None else self.integrated[:, i]
         triangles, mesh, nodes = self.surface.triangles - span.vertices.start, self.mesh, self.nodes
         own = ((triangles >= 0) & (triangles < span.vertices.stop - span.vertices.start)).all(axis=1)
@@ -69,14 +72,15 @@ class Followed:
         return diagonal(self.surface.points)
 
 
-_LOOKS = 33  # the number of positions of a vertex that are sampled on its path from a frame to the next
+_LOOKS = 33  # the number of sampled positions of a vertex on its path from one frame to the next
 
-# Values (f,), and words (f,) and points (f, 3) of the worst point; the last two are None if there is no worst point.
+# Values (f,) of a quantity, and the worst point in each frame: in words (f,), and its position (f, 3). The last two are None if
+# there is no worst point.
 Found = tuple[Floats, list[str] | None, Floats | None]
 
 
 def volume(run: Followed) -> Found:
-    """Change of the enclosed volume, in per cent of the volume at rest; for several bodies the maximum."""
+    """The change of the enclosed volume, in per cent of the volume at rest; for several bodies the maximum change."""
     if run.spans:
         changes = np.array([volume(one)[0] for one in run.bodies])
         return np.max(changes, axis=0), None, None
@@ -88,8 +92,10 @@ def volume(run: Followed) -> Found:
 
 
 def inside_out(run: Followed) -> Found:
-    """Inverted fraction: of the tetrahedra, if any, in per cent of the volume at rest, else of the surface in per cent of its
-    triangles. For curved elements, whose corners do not show inversion, it is 0 or 100 according to the minimum of det F.
+    """The inverted fraction of the body [%].
+
+    For a body with tetrahedra it is the fraction of the volume at rest, otherwise the fraction of the triangles of the surface. For
+    curved elements, whose corners do not show inversion, it is 0 or 100 according to the smallest det F.
     """
     if run.least_determinant is not None:
         words = [f"det F is at least {value:.2g}" for value in run.least_determinant]
@@ -112,23 +118,23 @@ def inside_out(run: Followed) -> Found:
 
 
 def from_rest(run: Followed) -> Found:
-    """Maximum distance of a vertex from its rest position, in per cent of the body's size."""
+    """The maximum distance of a vertex from its position at rest, in per cent of the size of the body."""
     return _off(run, np.broadcast_to(run.surface.points, run.positions.shape))
 
 
 def from_first(run: Followed) -> Found:
-    """Maximum distance of a vertex from its position in a rigid motion with the first bone, in per cent of the body's size."""
+    """The maximum distance of a vertex from its position in a rigid motion with the first bone, in per cent of the body's size."""
     poses = [run.bones[0].pose(number) for number in run.numbers]
     return _off(run, np.array([apply(pose, run.surface.points) for pose in poses]))
 
 
 def from_reference(run: Followed) -> Found:
-    """Maximum distance of a vertex from its place in the reference, in per cent of the body's size; NaN without a reference."""
+    """The maximum distance of a vertex from its position in the reference, in per cent of the body's size; NaN if unknown."""
     return _off(run, np.full(run.positions.shape, np.nan) if run.truth is None else run.truth)
 
 
 def stretch(run: Followed) -> Found:
-    """Maximum stretch of an edge of the surface, relative to rest."""
+    """The maximum stretch of an edge of the surface, relative to rest."""
     edges = np.unique(np.sort(run.surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     states = np.concatenate([run.surface.points[None], run.positions])
     rest, *lengths = np.linalg.norm(states[:, edges[:, 1]] - states[:, edges[:, 0]], axis=2)
@@ -139,7 +145,7 @@ def stretch(run: Followed) -> Found:
 
 
 def penetration(run: Followed) -> Found:
-    """Maximum depth of a free vertex inside a bone, in per cent of the body's size."""
+    """The maximum depth of a free vertex inside a bone, in per cent of the size of the body."""
     depths = np.zeros(run.positions.shape[:2])
     for bone in run.bones:
         for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
@@ -148,8 +154,8 @@ def penetration(run: Followed) -> Found:
 
 
 def passed(run: Followed) -> Found:
-    """Maximum depth of a free vertex inside a bone on the vertex's straight path, relative to the bone, from the last frame, in per
-    cent of the body's size. It detects a bone that crosses the body and is outside in both frames.
+    """The maximum depth inside a bone that a free vertex reaches on its path from the previous frame, in per cent of the body's
+    size. The path is straight, relative to the bone. This detects a bone that crosses the body and is outside it in both frames.
     """
     depths = np.zeros(run.positions.shape[:2])
     for bone in run.bones:
@@ -165,12 +171,14 @@ def passed(run: Followed) -> Found:
 
 
 def _deepest(run: Followed, depths: Floats) -> Found:
-    """The maximum of the ``depths`` (f, n) [mm] of free vertices, in per cent of the body's size."""
+    """The maximum of the ``depths`` (f, n) [mm] of free vertices, in per cent of the size of the body."""
     return _worst(run, 100 * np.where(True if run.free is None else run.free, depths, 0.0) / run.size)
 
 
 def pierced(run: Followed) -> Found:
-    """Maximum depth of a bone's vertex in the body, in per cent of the body's size: thin bones fit between its vertices."""
+    """The maximum depth of a vertex of a bone inside the body, in per cent of the size of the body. This detects thin bones, which
+    fit between the vertices of the body.
+    """
     values, places = np.zeros(len(run.numbers)), np.tile(run.surface.points[0], (len(run.numbers), 1))
     for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
         body = run.surface.moved_to(points)
@@ -184,8 +192,8 @@ def pierced(run: Followed) -> Found:
 
 
 def crossed(run: Followed) -> Found:
-    """Maximum depth to which bodies, or parts of one body, penetrate each other, in per cent of the size: 0 if an exact test finds
-    no intersecting triangles of their surfaces; for one body, triangles that intersect at rest are ignored.
+    """The maximum depth to which bodies, or parts of one body, penetrate each other, in per cent of the size of the body. The depth
+    is 0 if an exact test finds no intersecting triangles. Triangles of a single body that intersect at rest are ignored.
     """
     values, places = np.full(len(run.numbers), np.nan), np.tile(run.surface.points[0], (len(run.numbers), 1))
     for i, finite in enumerate(np.isfinite(run.positions).all(axis=(1, 2))):
@@ -198,7 +206,7 @@ def crossed(run: Followed) -> Found:
 
 
 def overshoot(run: Followed) -> Found:
-    """Maximum distance of a scalar field from the range of its boundary values, in per cent of that range."""
+    """The maximum distance of the values of a scalar field from the range of its boundary values, in per cent of this range."""
     assert run.values is not None  # only scalar fields have this quantity
     low, high = run.range
     beyond = np.maximum(run.values - high, low - run.values).max(axis=1)
@@ -211,7 +219,7 @@ def _off(run: Followed, wanted: Floats) -> Found:
 
 
 def _worst(run: Followed, each: Floats) -> Found:
-    """The maximum over the vertices in each frame of the values ``each`` (f, n)."""
+    """The maximum over the vertices of the values ``each`` (f, n), for each frame, with the vertex and its position."""
     worst = np.argmax(np.where(np.isnan(each), np.inf, each), axis=1)
     frames = np.arange(len(each))
     return each[frames, worst], [f"at vertex {vertex}" for vertex in worst], run.positions[frames, worst]
@@ -223,7 +231,7 @@ QUANTITIES: dict[str, Callable[[Followed], Found]] = {one.__name__: one for one 
 
 
 def unstable(run: Followed) -> str:
-    """The frames in which a run is an unstable equilibrium, in words; empty if there are none or modes were not counted."""
+    """The frames in which a run is an unstable equilibrium, in words; empty without such frames, or if modes were not counted."""
     if run.negative_modes is None or not (run.negative_modes > 0).any():
         return ""
     first, most = int(np.argmax(run.negative_modes > 0)), run.negative_modes.max()
@@ -233,6 +241,6 @@ def unstable(run: Followed) -> str:
 
 
 def history(run: Followed, quantity: str) -> History:
-    """A ``quantity`` of a run over its frames."""
+    """The history of a ``quantity`` of a run over its frames."""
     values, words, points = QUANTITIES[quantity](run)
     return History(quantity, "" if quantity == "stretch" else "%", run.numbers, values, tuple(words or ()), points)

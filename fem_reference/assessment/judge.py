@@ -1,4 +1,4 @@
-"""Verdicts on measures from truth and tolerance, and the doubts about a reference that make a pass doubtful."""
+"""Verdicts on measures, from a truth and a tolerance, and doubts about a reference, which make a pass doubtful."""
 
 import math
 from collections.abc import Collection, Iterable
@@ -30,13 +30,15 @@ _KINDS = {
     "kPa": ("a pressure", 1000.0),
     "1": ("a number", 1.0),
 }
-_LOW = 0.1  # det F below which a state is doubtful
+_LOW = 0.1  # a state is doubtful if its det F is below this
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """The verdict on an expectation: the ``word``, the decisive ``value`` in ``unit`` at ``frame``, and the ``error_bar`` of the
-    reference in that frame, NaN if it is unknown and None if there are no bars.
+    """The verdict ``word`` on an expectation.
+
+    ``value``: the decisive value, at ``frame``; ``truth`` and ``within``: the expected value and the tolerance, all in ``unit``.
+    ``error_bar``: the error bar of the reference in this frame, NaN if it is unknown and None if there are no bars.
     """
 
     word: Word
@@ -50,8 +52,11 @@ class Verdict:
 
 
 def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> Word:
-    """Pass if ``abs(value - truth) <= within`` for every truth within its ``error_bar``, fail if this holds for no such truth, else
-    inconclusive (all four in one unit). A value that is not a number fails; an unknown truth, tolerance or bar is inconclusive.
+    """Judge whether a ``value`` is at most ``within`` from the ``truth``, which is known up to its ``error_bar``; all in one unit.
+
+    The verdict is pass if ``abs(value - truth) <= within`` for every truth in the error bar, fail if this holds for no such truth,
+    otherwise inconclusive. A value that is not a number fails. If the truth, the tolerance or the bar is unknown, the verdict is
+    inconclusive.
 
     >>> judge(1.02, 1.0, 0.05), judge(float("nan"), 1.0, 0.05), judge(1.02, 1.0, 0.05, error_bar=0.04)
     ('pass', 'fail', 'inconclusive')
@@ -71,7 +76,7 @@ def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> 
 
 
 def overall(words: Iterable[Word]) -> Word:
-    """The combined verdict: the first of fail, inconclusive, doubtful pass and pass among the ``words``; else not judged."""
+    """The overall verdict: the first of fail, inconclusive, doubtful pass and pass among the ``words``; otherwise not judged."""
     found = set(words)
     order: tuple[Word, ...] = ("fail", "inconclusive", "doubtful pass", "pass")
     return next((word for word in order if word in found), "not judged")
@@ -102,12 +107,12 @@ def doubts(reference: Run) -> list[str]:
 
 
 def doubted(word: Word, doubts: Collection[str]) -> Word:
-    """The verdict ``word`` in view of ``doubts`` about its reference: a doubtful pass instead of a pass."""
+    """The verdict ``word`` in view of ``doubts`` about its reference: a pass becomes a doubtful pass."""
     return "doubtful pass" if word == "pass" and doubts else word
 
 
 def check(case: Case) -> None:
-    """Raise InputError unless each expectation of the case names an existing measure and frame, in the unit of the measure."""
+    """Raise InputError unless each expectation of the case names an existing measure and frame, in a unit of the measure."""
     numbers = case.numbers
     for i, entry in enumerate(case.expect):
         place, expectation = join(case.place, f"expect[{i}]"), resolved(entry)
@@ -132,7 +137,7 @@ def check(case: Case) -> None:
 
 
 def resolved(expectation: Expectation) -> Expectation:
-    """The ``expectation`` with its statistic, by default the only one of its metric."""
+    """The ``expectation`` with its statistic. If it states none, and its metric has only one statistic, this one is filled in."""
     start = f"{expectation.metric}."
     names = [name.removeprefix(start) for name in units() if name.startswith(start)]
     if expectation.statistic is not None or len(names) != 1:
@@ -141,7 +146,7 @@ def resolved(expectation: Expectation) -> Expectation:
 
 
 def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...]) -> Verdict:
-    """The verdict on a checked ``expectation`` from the ``measures`` of its run over frame ``numbers``."""
+    """The verdict on a checked ``expectation``, from the ``measures`` of its run at frame ``numbers``."""
     name = (expectation.metric, expectation.statistic)
     found = next(measure for measure in measures if (measure.metric, measure.statistic) == name)
     bars = found.error_bars
@@ -151,7 +156,8 @@ def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tupl
     known = [0.0 if bars is None else float(bars[frame]) for frame in frames]
     words = [judge(value, truth, within, bar) for value, bar in zip(values, known, strict=True)]
     word = overall(words)
-    # The first failing frame decides, else the inconclusive frame with the widest bar, else the frame farthest from the truth.
+    # The first failing frame decides; otherwise the inconclusive frame with the widest bar; otherwise the frame farthest from the
+    # truth.
     furthest = max(range(len(values)), key=lambda k: abs(values[k] - truth))
     width = [math.inf if math.isnan(bar) else bar for bar in known]
     widest = max(range(len(values)), key=lambda k: (words[k] == "inconclusive", width[k]))
@@ -162,6 +168,8 @@ def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tupl
 
 
 def in_unit(given: str | float, unit: str) -> float:
-    """A quantity in the ``unit`` of a measure, a bare number only for the unit "1"; ValueError if the dimension differs."""
+    """The quantity ``given`` in the ``unit`` of a measure. A number without a unit is accepted only for the unit "1". Raises
+    ValueError if the dimension differs.
+    """
     kind, factor = _KINDS[unit]
     return float(given) if unit == "1" and not isinstance(given, str) else quantity(given, kind) * factor

@@ -1,4 +1,4 @@
-"""Quantities of runs at every vertex and fibre point, by frame, for the colours of a view and for ParaView."""
+"""Quantities at every vertex and fibre point of a run in each frame, for the colours of a view and for ParaView."""
 
 import numpy as np
 
@@ -12,12 +12,12 @@ from fem_reference.runs.store import Run
 
 @np.errstate(over="ignore", invalid="ignore")
 def to_same_vertex(run: Run, reference: Run) -> Floats:
-    """Distance (f, n) [mm] of each vertex to the same vertex of the reference; NaN if unknown."""
+    """The distance (f, n) [mm] of each vertex from the same vertex of the reference; NaN if unknown."""
     return np.asarray(np.linalg.norm(run.positions - reference.positions, axis=2))
 
 
 def to_surface(run: Run, reference: Run) -> Floats:
-    """Distance (f, n) [mm] of each vertex to the nearest point of the reference's surface, negative inside; NaN if unknown."""
+    """The distance (f, n) [mm] of each vertex from the surface of the reference, negative inside; NaN if unknown."""
     found = np.full(run.positions.shape[:2], np.nan)
     for i, (points, others) in enumerate(zip(run.positions, reference.positions, strict=True)):
         if np.isfinite(points).all() and np.isfinite(others).all():
@@ -26,8 +26,10 @@ def to_surface(run: Run, reference: Run) -> Floats:
 
 
 def to_bones(run: Run, context: MeasurementContext) -> Floats | None:
-    """Distance (f, n) [mm] of each vertex to the nearest bone, negative inside, at most ``DISTANCE_MARGIN``; NaN for vertices
-    that are exempt from contact or unknown. None if a bone is not closed and so has no inside.
+    """The distance (f, n) [mm] of each vertex from the nearest bone, negative inside and at most ``DISTANCE_MARGIN``.
+
+    NaN for vertices that are exempt from contact, and in frames in which a vertex is unknown. None if a bone is not closed and so
+    has no inside.
     """
     gaps = np.full(run.positions.shape[:2], DISTANCE_MARGIN)
     try:
@@ -41,9 +43,9 @@ def to_bones(run: Run, context: MeasurementContext) -> Floats | None:
 
 
 def stretch_along(lines: Polylines, positions: Floats) -> Floats:
-    """Stretch (f, m) at the points of ``lines`` moved to ``positions`` (f, m, 3) [mm], of both adjacent pieces taken together."""
+    """The stretch (f, m) at the points of ``lines`` moved to ``positions`` (f, m, 3) [mm], of the two adjacent pieces together."""
     count = len(lines.points)
-    joined = np.ones(count - 1, bool)  # True where a piece joins a point with the next
+    joined = np.ones(count - 1, bool)  # True where a piece joins a point to the next point
     joined[lines.offsets[1:-1] - 1] = False
     pieces = np.flatnonzero(joined)
     ends = np.concatenate([pieces, pieces + 1])

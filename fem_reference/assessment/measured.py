@@ -1,4 +1,4 @@
-"""Measures of a candidate's current output against the reference."""
+"""Measures of the current output of a candidate against the reference."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from fem_reference.scenes.muscle import MuscleCase
 
 @dataclass(frozen=True, eq=False)
 class CurrentMeasures:
-    """The current output of a candidate, measured against the ``reference`` with its ``error_bars``, None if unknown."""
+    """The current output of a candidate, measured against the ``reference``; ``error_bars`` of the reference, None if unknown."""
 
     scene: MuscleCase
     candidate: Run
@@ -27,13 +27,13 @@ class CurrentMeasures:
     def of(
         cls, case: MuscleCase, setup: Setup, candidate: Run, reference: Run, error_bars: ErrorBars | None = None
     ) -> "CurrentMeasures":
-        """Measure a candidate and its reference, which both have the frames of the case."""
+        """Measure a candidate against its reference. Both must have the frames of the case."""
         measures = metrics.measure(candidate, reference, metrics.context_of(setup, reference))
         return cls(case, candidate, reference, measures, error_bars)
 
     @property
     def points(self) -> Floats:
-        """Positions of the candidate's vertices (f, n, 3) [mm], or of its fibre points if it has no surface."""
+        """Positions (f, n, 3) [mm] of the vertices of the candidate, or of its fibre points if it has no surface."""
         inside = self.candidate.fibre_positions
         return self.candidate.positions if self.candidate.has_surface or inside is None else inside
 
@@ -45,24 +45,24 @@ class CurrentMeasures:
 
     @property
     def reference_name(self) -> str:
-        """The folder of the reference in the store, named by scene, settings and code; its solver if it has no folder."""
+        """The folder of the reference in the store, named by scene, settings and code; the solver if there is no folder."""
         folder = self.reference.folder
         return self.reference.solver if folder is None else folder.name
 
     @property
     def by_name(self) -> dict[str, Measure]:
-        """The measures by ``metric.statistic``, without measures that repeat another in per cent."""
+        """The measures by ``metric.statistic``, without those that repeat another measure in per cent."""
         found = {f"{one.metric}.{one.statistic}": one for one in self.measures}
         return {name: one for name, one in found.items() if name.removesuffix("_percent") not in found.keys() - {name}}
 
     def values(self, name: str) -> Floats:
-        """The values (f,) of a ``metric.statistic``, NaN if not finite or not measured for this candidate."""
+        """The values (f,) of a ``metric.statistic``; NaN if they are not finite, or if it was not measured for this candidate."""
         found = metrics.find(self.measures, *name.split("."))
         values = np.full(len(self.reference.numbers), np.nan) if found is None else found.values
         return np.where(np.isfinite(values), values, np.nan)
 
     def bars(self, name: str) -> Floats:
-        """The error bars (f,) of a deviation by ``metric.statistic``, NaN if unknown; a statistic of the run itself is exact."""
+        """The error bars (f,) of a deviation by ``metric.statistic``, NaN if unknown; 0 for statistics of the run itself."""
         metric, statistic = name.split(".")
         if metrics.of_itself(metric):
             return np.zeros(len(self.reference.numbers))

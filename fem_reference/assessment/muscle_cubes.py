@@ -1,4 +1,4 @@
-"""Cubes of muscle under load: quantities measured in experiments, and the same quantities computed for a material."""
+"""Cubes of muscle under load: quantities that were measured in experiments, and the same quantities computed for a material."""
 
 import math
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from fem_reference.problems.cubes import FREE, CubeState, loaded
 
 Material = tuple[Effect, ...]
 SQUEEZED, STRETCHED = 0.9, 1.1
-_CLEAR = 0.01  # the fraction by which the stiffness in a direction must differ to count as softer or stiffer
+_CLEAR = 0.01  # the fraction by which a stiffness must differ to count as softer or stiffer
 # The volume law of the case hip_flexion, after Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 VOLUME = make("incompressible_penalty", bulk="10 MPa")
 FIBRES = {"stress": 0.3, "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
@@ -22,9 +22,12 @@ SHIPPED: Material = (make("neo_hooke", mu=0.01), VOLUME, make("fibre_passive", *
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """A measured quantity of a cube: its ``truth`` in ``unit`` from ``facts`` of an ``experiment``, its uncertainty ``within`` and
-    the reason for it (``because``); ``of``: its value for a material. ``limit``: the reason why the shipped law cannot reach the
-    truth. ``is_order``: True for a stiffness ranking: the value is 1 if it is reproduced, else 0, the tolerance 0.5.
+    """A measured quantity of a cube.
+
+    ``truth``: its value in ``unit``, from ``facts`` of an ``experiment``. ``within`` and ``because``: the uncertainty of this
+    value, and the reason for it. ``of``: a function that computes the quantity for a material. ``limit``: the reason why the
+    shipped law cannot reach the truth. ``is_order``: True for a ranking of stiffnesses: the value is 1 if the ranking is reproduced
+    and 0 if it is not, and the tolerance is 0.5.
     """
 
     name: str
@@ -41,35 +44,35 @@ class Quantity:
 
 
 def with_collagen(fibres: float, k1: float, k2: float) -> Material:
-    """The shipped matrix with ``collagen_across`` of ``k1`` [MPa] and ``k2``, and fibres with the stress ``fibres`` [MPa]."""
+    """The shipped matrix with ``collagen_across`` of ``k1`` [MPa] and ``k2``, and with fibres of the stress ``fibres`` [MPa]."""
     passive = make("fibre_passive", **(FIBRES | {"stress": fibres}))
     return (*SHIPPED[:2], passive, make("collagen_across", k1=k1, k2=k2))
 
 
 @lru_cache(1000)
 def cube(material: Material, stretch: float, degrees: float, *, confined: bool = False) -> CubeState:
-    """A cube loaded along x to a ``stretch``, with fibres at ``degrees`` to x in the xy plane; ``confined``: fixed along z."""
+    """A cube loaded along x to a ``stretch``, with fibres in the xy plane at ``degrees`` to x; ``confined``: fixed along z."""
     fibre = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0])
     return loaded(material, (stretch, FREE, 1.0 if confined else FREE), fibre)
 
 
 def stress(material: Material, stretch: float, degrees: float, *, confined: bool = False) -> float:
-    """The nominal stress along the load [MPa]."""
+    """The nominal stress [MPa] of a cube along the load."""
     return float(cube(material, stretch, degrees, confined=confined).P[0, 0])
 
 
 def poisson(stretch: float, degrees: float, axis: int) -> Callable[[Material], float]:
-    """The Poisson ratio of the strain along ``axis``, y or z."""
+    """A function from a material to the Poisson ratio of a cube, for the strain along ``axis``, y or z."""
     return lambda material: cube(material, stretch, degrees).poisson_ratio(0, axis)
 
 
 def stiffness_ratio(stretch: float) -> Callable[[Material], float]:
-    """The ratio of the stress of a cube loaded along its fibres to that of a cube loaded across them."""
+    """A function from a material to the stress of a cube loaded along its fibres, divided by that of a cube loaded across them."""
     return lambda material: stress(material, stretch, 0) / stress(material, stretch, 90)
 
 
 def _extreme(material: Material, *, degrees: float, softest: bool) -> float:
-    """1 if, among cubes with fibres at 0, 45 and 90 degrees, the cube at ``degrees`` is softest (or stiffest) by 1 %, else 0."""
+    """1 if the cube with fibres at ``degrees`` is the softest (or stiffest) of 0, 45 and 90 degrees by more than 1 %, else 0."""
     found = {angle: abs(stress(material, SQUEEZED, angle)) for angle in (0.0, 45.0, 90.0)}
     own = found.pop(degrees)
     clear = own < (1 - _CLEAR) * min(found.values()) if softest else own > (1 + _CLEAR) * max(found.values())
@@ -77,12 +80,12 @@ def _extreme(material: Material, *, degrees: float, softest: bool) -> float:
 
 
 def confinement(material: Material) -> float:
-    """The stress across fibres in semi-confined compression, which lengthens them, divided by that in unconfined compression."""
+    """The stress across fibres in semi-confined compression, where they lengthen, divided by that in unconfined compression."""
     return stress(material, SQUEEZED, 90, confined=True) / stress(material, SQUEEZED, 90)
 
 
 def both_orders(material: Material) -> float:
-    """1 if the cube is stiffer along its fibres in compression and stiffer across them in tension, by at least 1 %, else 0."""
+    """1 if a cube is stiffer along its fibres in compression and stiffer across them in tension, each by more than 1 %, else 0."""
     squeezed, stretched = (stiffness_ratio(stretch)(material) for stretch in (SQUEEZED, STRETCHED))
     return float(squeezed > 1 + _CLEAR and stretched < 1 - _CLEAR)
 
@@ -112,7 +115,7 @@ def _pulled(name: str, title: str, condition: str, axis: int) -> Quantity:
 
 
 def _ratio_by_symmetry() -> Quantity:
-    """Young's modulus along / across fibres: the ratio of the two Poisson ratios, because the compliance is symmetric."""
+    """The ratio of Young's moduli along and across the fibres: as the compliance is symmetric, the ratio of two Poisson ratios."""
     along, across = (find(LOOCKE, "poisson_ratio", words) for words in ("both strains across", "strain along them"))
     truth = along.value / across.value
     within = truth * math.hypot(0.05 / along.value, 0.05 / across.value)

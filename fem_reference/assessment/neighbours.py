@@ -1,4 +1,4 @@
-"""Penetration of muscles into each other: a check for the solved tetrahedra, and a measure for the surfaces of any run."""
+"""Penetration of muscles into each other: a check of the solved tetrahedra, and a measure for the surfaces of any run."""
 
 from collections.abc import Callable, Iterator, Mapping
 from itertools import combinations
@@ -15,19 +15,20 @@ from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.problems.touching import pressure_name
 from fem_reference.runs.store import Run
 
-# The allowed gap between curved facets of pressed tetrahedra and the flat triangles of their corners, as a fraction of an edge; it
-# falls with the square of the size of triangles.
+# The allowed gap between the curved facets of pressed tetrahedra and the flat triangles between their corners, as a fraction of an
+# edge. Such gaps decrease with the square of the size of the triangles.
 _BULGE = 0.05
-# The triangles that replace each curved facet, in its barycentric coordinates.
+# The triangles that replace each curved facet, in barycentric coordinates of the facet.
 _PIECES = quartered(quartered(np.eye(3)[None])).reshape(-1, 3)
 Displacement = Callable[[int], Floats | None]
 
 
 def between(problem: MusclesProblem, run: Run, nodes: Nodes, states: Displacement = lambda _: None) -> RunChecks:
-    """The check that no muscle is inside another, at the corners of the tetrahedra, if contact acts or was omitted as unneeded.
-    The compliance of contact under its pressure and the bulge of facets are allowed. If muscles press on each other and ``states``
-    gives the displacement (m, 10, 3) [mm] at the frame, curved facets are checked, each as 16 triangles. The check fails if no
-    tetrahedra are stored.
+    """Check that no muscle is inside another, if contact acts or was omitted because it is not needed.
+
+    The compliance of contact under its pressure and the bulge of facets are allowed. ``nodes``: the corners of the tetrahedra by
+    frame number; the check fails if they are not stored. ``states``: the displacement (m, 10, 3) [mm] by frame number. If it is
+    known and muscles press on each other, the curved facets are checked, each as 16 triangles.
     """
     if not problem.apart:
         return ()
@@ -60,7 +61,7 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes, states: Displacemen
 
 
 def _curved(mesh: TetMesh, displacement: Floats) -> Surface:
-    """The boundary of a ``mesh`` with a quadratic ``displacement`` (m, 10, 3) [mm], with 16 triangles for each facet."""
+    """The boundary of a ``mesh`` with a quadratic ``displacement`` (m, 10, 3) [mm], as 16 triangles for each facet."""
     facets, cells = boundary(mesh.tets)
     corners = np.eye(4)[(facets[:, :, None] == mesh.tets[cells][:, None]).argmax(axis=2)]
     at = np.einsum("sc,fcb->fsb", _PIECES, corners)  # in barycentric coordinates of the tetrahedron
@@ -70,7 +71,7 @@ def _curved(mesh: TetMesh, displacement: Floats) -> Surface:
 
 
 def depths(runs: Mapping[str, Run]) -> Iterator[tuple[str, str, Floats]]:
-    """The names of each pair of muscles and the depth (f,) [mm] of their overlap in their ``runs``, NaN if one is not finite."""
+    """Both names and the depth of overlap (f,) [mm] for each pair of muscles in ``runs``; NaN where a position is not finite."""
     for one, other in combinations(runs, 2):
         found = list[float]()
         for a, b in zip(runs[one].positions, runs[other].positions, strict=True):

@@ -1,4 +1,4 @@
-"""Omissions of effects of a scene or features of a solver: the changes, compared with the error bar, and the time saved."""
+"""Omissions of effects of a scene or features of a solver: the changes that they cause, and the time that they save."""
 
 import math
 from collections.abc import Mapping
@@ -8,11 +8,11 @@ from typing import Any, Literal
 from fem_reference.metrics import described, metric
 
 FORMAT = 1
-# Measures of a run with an omission, relative to the complete run of the same solver.
+# The measures of a run with an omission. Its reference is the complete run of the same solver.
 MEASURES = tuple(".".join(key) for key in described("main") if metric(key[0]).OF != "field")
-# If all changes are below this fraction of the error bar, an omission does not matter.
+# An omission does not matter if all changes are below this fraction of their error bars.
 NEGLIGIBLE = 0.1
-# Parts of the solving time that runs may report, and their names in runs; the total is a little more.
+# The parts of the solving time that runs may report, with their names in runs; the total is slightly longer than their sum.
 PHASES = {"assembly": ("assembly",), "contact": ("contact",), "linear systems": ("factorisation", "krylov")}
 COUNTS = ("unknowns", "newton_iterations", "load_steps")
 
@@ -21,11 +21,13 @@ Word = Literal["matters", "hardly", "does not matter", "not known"]
 
 @dataclass(frozen=True)
 class Omission:
-    """A run and its outcome. ``left_out``: names of the omitted effects or features (none, one, or all that can be omitted);
-    ``instead``: settings that had to change because of the omission. A run that was not made has the status ``"refused"``.
+    """The outcome of a run with an omission.
 
-    ``changes``: by ``metric.statistic``, the maximum magnitude over the frames of the change from the complete run; left out if
-    unknown in a frame. ``predicted``: the value of an indicator, if any, by ``metric.statistic``. ``costs``: as in the run.
+    ``left_out``: the names of the omitted effects or features: none, one, or all that can be omitted. ``status`` and ``message``:
+    the outcome; a run that was not made has the status ``"refused"``. ``changes``: by ``metric.statistic``, the maximum magnitude
+    over the frames of the change from the complete run; a statistic that is unknown in a frame is left out. ``costs``: as in the
+    run. ``instead``: settings that had to be changed because of the omission. ``predicted``: by ``metric.statistic``, the value of
+    an indicator, for omissions that have one.
     """
 
     left_out: tuple[str, ...]
@@ -38,18 +40,20 @@ class Omission:
 
     @property
     def seconds(self) -> float:
-        """Processor time [s], for the reference without compilation; NaN if unknown."""
+        """The processor time [s], without compilation in the case of the reference; NaN if unknown."""
         return self.costs.get("seconds_processor_solve", self.costs.get("seconds_processor", math.nan))
 
     def phase(self, name: str) -> float:
-        """Processor time [s] of one of ``PHASES``: its fraction of the solving time times :attr:`seconds`; NaN if unknown."""
+        """The processor time [s] of one of ``PHASES``: its fraction of the solving time times :attr:`seconds`; NaN if unknown."""
         spent = sum(self.costs.get(f"seconds_{part}", math.nan) for part in PHASES[name])
         return self.seconds * spent / (self.costs.get("seconds_solve") or math.nan)
 
 
 @dataclass(frozen=True)
 class Ablation:
-    """Runs ``name`` by ``solver``: the complete run (``whole``) and its ``omissions``; ``kept``: what is never omitted."""
+    """The runs called ``name`` of a ``solver``: the complete run (``whole``) and its ``omissions``. ``kept``: the effects or
+    features that are never omitted.
+    """
 
     name: str
     solver: str
@@ -58,18 +62,20 @@ class Ablation:
     omissions: tuple[Omission, ...]
 
     def relative(self, seconds: float) -> float:
-        """A time [s] divided by that of the complete run, NaN if either is unknown."""
+        """A time [s] divided by the time of the complete run; NaN if either is unknown."""
         return seconds / (self.whole.seconds or math.nan)
 
     def count(self, omission: Omission, name: str) -> float:
-        """One of ``COUNTS`` divided by its value in the complete run, NaN if either is unknown."""
+        """One of the ``COUNTS`` of an omission divided by its value in the complete run; NaN if either is unknown."""
         return omission.costs.get(name, math.nan) / (self.whole.costs.get(name) or math.nan)
 
 
 @dataclass(frozen=True)
 class CaseOmissions:
-    """The ablations of a case, the reference's first. ``bars``, ``units``: its error bars, the maximum over the frames, and their
-    units by ``metric.statistic``; ``unknown``: the reason why there are no bars; ``origin``: provenance of the measurements.
+    """The ablations of a case; the ablation of the reference is the first.
+
+    ``units`` and ``bars``: by ``metric.statistic``, the unit and the maximum error bar over the frames. ``unknown``: the reason why
+    there are no bars. ``origin``: the provenance of the measurements.
     """
 
     case: str
@@ -82,7 +88,7 @@ class CaseOmissions:
 
 
 def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str, float]:
-    """Each of ``changes`` in error bars: NaN if the bar is unknown.
+    """Each of the ``changes`` divided by its error bar; NaN if the bar is unknown.
 
     >>> in_bars({"volume.deviation": 0.5, "surface_deviation.rms": 1.0}, {"volume.deviation": 0.25})
     {'volume.deviation': 2.0, 'surface_deviation.rms': nan}
@@ -92,7 +98,7 @@ def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str
 
 
 def verdict(changes: Mapping[str, float], bars: Mapping[str, float]) -> Word:
-    """Judge an omission: it matters if one of ``changes`` exceeds its error bar, and does not if all are below a tenth of theirs.
+    """Judge an omission: it matters if one of its ``changes`` exceeds its error bar, and does not if all are below a tenth.
 
     >>> bars = {"volume.deviation": 0.1, "surface_deviation.rms": 1.0}
     >>> [verdict({"volume.deviation": 0.005, "surface_deviation.rms": x}, bars) for x in (0.05, 0.5, 5.0)]

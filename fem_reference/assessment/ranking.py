@@ -1,4 +1,4 @@
-"""Ranking of solvers by their distance to the reference; differences within the error bars are not ranked."""
+"""Ranking of solvers by their distance from the reference; differences within the error bars are not ranked."""
 
 import math
 from collections.abc import Iterable
@@ -10,7 +10,7 @@ from fem_reference.metrics import Measure, described, find
 
 @dataclass(frozen=True)
 class Deviation:
-    """The distance of ``name`` from the reference in its worst frame, with the error ``bar`` in this frame, NaN if unknown."""
+    """The distance ``value`` of a candidate from the reference in its worst frame, and the error ``bar`` there, NaN if unknown."""
 
     name: str
     value: float
@@ -19,7 +19,9 @@ class Deviation:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A deviation with its possible ranks, ``first`` to ``last``, and the names ``alike`` that cannot be distinguished from it."""
+    """A deviation with its possible ranks, from ``first`` to ``last``, and the names of the candidates that cannot be distinguished
+    from it (``alike``).
+    """
 
     deviation: Deviation
     first: int
@@ -34,7 +36,7 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Ranking:
-    """The candidates ranked by one statistic (``places``), the least deviation first; ``title`` and ``unit`` of the statistic."""
+    """The candidates ranked by one statistic (``places``), the smallest deviation first; its ``title`` and its ``unit``."""
 
     title: str
     unit: str
@@ -42,14 +44,14 @@ class Ranking:
 
     @property
     def pairs(self) -> tuple[int, int]:
-        """The number of distinguishable pairs, and of all pairs."""
+        """The number of pairs of candidates that can be distinguished, and the number of all pairs."""
         count = len(self.places)
         alike = sum(len(place.alike) for place in self.places) // 2
         return count * (count - 1) // 2 - alike, count * (count - 1) // 2
 
 
 def ranked(deviations: Iterable[Deviation]) -> tuple[Ranked, ...]:
-    """The places of ``deviations``: two differ in rank if their bars do not overlap; NaN comes last.
+    """The ``deviations`` in order, with their ranks. Two of them differ in rank if their error bars do not overlap. NaN comes last.
 
     >>> [place.rank for place in ranked([Deviation("a", 5.0, 0.4), Deviation("b", 2.0, 0.4), Deviation("c", 2.5, 0.4)])]
     ['1 to 2', '1 to 2', '3']
@@ -73,8 +75,8 @@ def _less(one: Deviation, other: Deviation) -> bool:
 
 
 def rankings(measured: dict[str, tuple[Measure, ...]], bars: Iterable[Measure]) -> tuple[Ranking, ...]:
-    """The rankings of ``measured`` (measures against the reference by name) by each ranked statistic, among runs that have it;
-    ``bars``: the error bars of deviations; a statistic without a bar is left out.
+    """The rankings by each statistic that is ranked, among the runs that have this statistic. ``measured``: the measures of each
+    run against the reference, by name. ``bars``: the error bars of deviations; a statistic without a bar is left out.
     """
     known, found = tuple(bars), []
     for key, stated in described("rank").items():
@@ -91,7 +93,7 @@ def rankings(measured: dict[str, tuple[Measure, ...]], bars: Iterable[Measure]) 
 
 
 def facts(found: Iterable[Ranking]) -> list[dict[str, object]]:
-    """Rankings as valid JSON: a number that is not finite is None."""
+    """Rankings as valid JSON, with None for a number that is not finite."""
     return [
         {
             "by": one.title,

@@ -1,5 +1,5 @@
 """Recommendation of the cheapest or most accurate setting, as measured on the case itself or on the most similar cases; and the
-transfer of settings, with other sizes of tetrahedra, to a case that is left out.
+transfer of settings, with the size of tetrahedra scaled, to a case that is left out.
 """
 
 import math
@@ -15,9 +15,10 @@ from fem_reference.foundations.errors import InputError
 
 TIME = "seconds_per_frame"
 Features = Mapping[str, float]  # the features of a case, by name
-# The number of most similar other cases that are used.
+# The number of most similar cases that are used for a case that has no study.
 _ALIKE = 3
-# Margins are such that this fraction of the values measured on left-out cases stays within the values expected from the others.
+# Margins are chosen so that this fraction of the values measured on left-out cases stays below the values expected from other
+# cases.
 _MET = 0.95
 # The features that determine similarity.
 _COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
@@ -25,8 +26,8 @@ _COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
 
 @dataclass(frozen=True)
 class Expected:
-    """A setting with its expected ``error`` and ``time`` per frame [s]; ``of``: the cases on which it was measured. If it was
-    measured on the case itself, ``bar`` is the known error bar of the truth, which is part of the error.
+    """A setting with its expected ``error`` and ``time`` per frame [s]. ``of``: the cases on which it was measured. If this is the
+    case itself, ``bar`` is the known error bar of the truth, which is part of the error.
     """
 
     point: Point
@@ -37,18 +38,18 @@ class Expected:
 
     @property
     def counted(self) -> float:
-        """The error for ranking: a measured error below the bar of the truth counts as the bar."""
+        """The error for ranking: the error without the bar of the truth, but at least this bar."""
         return max(self.error - self.bar, self.bar)
 
     def misses(self, limits: Mapping[str, float]) -> float:
-        """The greater of the ratios of error and time to their ``limits``."""
+        """The larger of the ratios of error and time to their ``limits``."""
         own = {"error": self.error, "time": self.time}
         return max(own[name] / limit for name, limit in limits.items())
 
 
 @dataclass(frozen=True)
 class Margins:
-    """Factors on errors and times relative to the most similar cases; 1 if measured on the case."""
+    """Factors on the errors and times expected from the most similar cases; 1 if they were measured on the case itself."""
 
     error: float = 1.0
     time: float = 1.0
@@ -56,9 +57,10 @@ class Margins:
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """The ``best`` setting (None: no setting meets the limits) out of ``count``, including ``margins``; ``measured``: True if
-    measured on the case itself; ``nearest``: the setting that misses the limits least, if no setting meets them; ``loads``: for
-    each setting, the fraction of the machine that other processes kept busy while it was timed.
+    """The recommended setting (``best``) out of ``count`` settings, with ``margins`` included; None if no setting meets the limits.
+
+    ``nearest``: in that case, the setting that exceeds the limits least. ``of``: the cases on which the settings were measured.
+    ``measured``: True if this is the case itself. ``loads``: by setting, the fraction of the machine that other processes used.
     """
 
     best: Expected | None
@@ -83,7 +85,7 @@ class KnownSettings:
 def recommend(
     features: Features, case: str, studies: Sequence[CaseStudy], metric: str, limits: Mapping[str, float]
 ) -> Recommendation:
-    """The setting for a ``case``, :func:`chosen` by ``limits`` from all in :func:`known_settings`."""
+    """The setting for a ``case`` that :func:`chosen` selects by ``limits`` from :func:`known_settings`."""
     known = known_settings(features, case, studies, metric)
     best, nearest = chosen(known.settings, limits)
     loads = tuple(one.point.load for one in known.settings)
@@ -91,8 +93,8 @@ def recommend(
 
 
 def chosen(known: Sequence[Expected], limits: Mapping[str, float]) -> tuple[Expected | None, Expected | None]:
-    """The best setting within ``limits`` and, if there is none, the setting that misses them least. With a limit ``"error"``, the
-    best is the cheapest; with a limit ``"time"`` [s] per frame alone, the most accurate.
+    """The best setting within the ``limits``, None if there is none, and in that case the setting that exceeds the limits least.
+    With a limit ``"error"`` the cheapest setting is the best; with only a limit ``"time"`` [s] per frame, the most accurate.
     """
     most = {"error": math.inf, "time": math.inf} | dict(limits)
     fitting = [one for one in known if one.error <= most["error"] and one.time <= most["time"]]
@@ -102,8 +104,8 @@ def chosen(known: Sequence[Expected], limits: Mapping[str, float]) -> tuple[Expe
 
 
 def known_settings(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> KnownSettings:
-    """The settings for a ``case`` with these features; only studies with the ``metric`` count. An error is the measured error plus
-    the bar of the truth, as in the tables of a study.
+    """The settings for a ``case`` with these ``features``, from the ``studies`` that have the ``metric``. An error is the measured
+    error plus the error bar of the truth, as in the tables of a study.
     """
     studies = [study for study in studies if metric in study.units]
     own = [study for study in studies if study.case == case and _is_same(features, study.features)]
@@ -115,7 +117,7 @@ def known_settings(features: Features, case: str, studies: Sequence[CaseStudy], 
 
 
 def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> Sequence[CaseStudy]:
-    """The studies that are comparable with these features: lengths scale with the motion of bones, so bones must move."""
+    """The ``studies`` comparable with a case with these ``features``: lengths scale with the motion of bones, which must move."""
     if _is_share(metric):
         return studies
     if not features["motion"] > 0:
@@ -132,8 +134,8 @@ def _is_same(one: Features, other: Features) -> bool:
 
 
 def alike(features: Features, studies: Iterable[CaseStudy]) -> list[CaseStudy]:
-    """The studies of the cases most similar to a case with these features, the most similar first: with the least sum of
-    absolute logarithms of the ratios of features. Cases with and without contact are far apart.
+    """The studies of the cases most similar to a case with these ``features``, the most similar first. The measure is the sum of
+    the absolute logarithms of the ratios of features; cases with and without contact are far apart.
     """
 
     def distance(study: CaseStudy) -> float:
@@ -150,14 +152,16 @@ def _compared(features: Features, name: str) -> float:
 
 
 def _measured(study: CaseStudy, metric: str) -> list[Expected]:
-    """The settings measured on a case, the truth itself among them; its error bar counts as error."""
+    """The settings measured on a case, including the truth itself; the error bar of the truth is part of each error."""
     bar, pairs = study.bars.get(metric, 0.0), zip(study.points, study.certain, strict=True)
     known = [(point, pair) for point, certain in pairs if (pair := certain.at(metric, TIME))]
     return [Expected(point, error, time, (study.case,), bar) for point, (error, time) in known]
 
 
 def _expected(features: Features, studies: Sequence[CaseStudy], metric: str, margins: Margins) -> Iterable[Expected]:
-    """The settings measured on all of the most similar cases: worst errors, scaled by motion, and times, scaled by triangles."""
+    """The settings that were measured on each of the most similar cases, with the largest error, scaled by motion, and the longest
+    time, scaled by the number of triangles.
+    """
     chosen = alike(features, studies)
     by_key = [
         {setting(one.point, study): one for one in _measured(study, metric) if is_elsewhere(one.point)}
@@ -176,7 +180,7 @@ def _expected(features: Features, studies: Sequence[CaseStudy], metric: str, mar
 
 
 def scale(features: Features, other: Features, metric: str) -> float:
-    """The factor from an error on the ``other`` case to an error on this case: lengths scale with motion, percentages do not."""
+    """The factor from an error on the ``other`` case to an error on this case. Lengths scale with motion; percentages do not."""
     return 1.0 if _is_share(metric) else features["motion"] / other["motion"]
 
 
@@ -185,7 +189,7 @@ def _is_share(metric: str) -> bool:
 
 
 def _translated(point: Point, study: CaseStudy, features: Features) -> Point:
-    """A point of a study with its tetrahedra scaled to another case, and doubled in size for each refinement below zero."""
+    """A ``point`` of a study with its tetrahedra scaled to another case; the size is doubled for each refinement below zero."""
     scene = dict(point.choice.get("scene", {}))
     if not set(TETRAHEDRA) <= set(scene):
         return point
@@ -197,7 +201,7 @@ def _translated(point: Point, study: CaseStudy, features: Features) -> Point:
 
 
 def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
-    """Margins from leaving out each study in turn: the ratio of its measured values to the values expected from the others."""
+    """Margins from leaving out each study in turn: the ratios of its measured values to those expected from the others."""
     errors, times = list[float](), list[float]()
     for study in studies:
         others = [other for other in studies if other is not study]
@@ -212,7 +216,7 @@ def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
 
 
 def setting(point: Point, study: CaseStudy) -> str:
-    """A key that identifies a setting across cases; tetrahedra count by their size relative to the case's own reference."""
+    """A key that identifies a setting across cases, with the size of tetrahedra relative to the case's own reference."""
     scene = point.choice.get("scene", {})
     if not is_elsewhere(point):
         return f"{study.case}: {point.label}"
@@ -225,12 +229,12 @@ def setting(point: Point, study: CaseStudy) -> str:
 
 
 def is_elsewhere(point: Point) -> bool:
-    """True if a setting can be used on another case: only mesh keys of a scene are transferable."""
+    """True if a setting can be used on another case: of its scene keys, only those of the mesh can be transferred."""
     return not set(point.choice.get("scene", {})) - {*TETRAHEDRA, "triangles"}
 
 
 def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
-    """The ratio of a point's size of tetrahedra to the case's, both before refinement, and the case's refinements minus its own."""
+    """The size of a point's tetrahedra relative to its case's, before refinement, and how many refinements fewer it has."""
     scene = point.choice["scene"]
     size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
     return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]
@@ -243,8 +247,9 @@ def _settings(point: Point) -> str:
 
 @dataclass(frozen=True)
 class Transfer:
-    """Settings of a ``solver`` chosen on all cases except ``left_out`` and applied to that case: their ``error``, the ``best``
-    error of any of the same settings, and the error of the ``default`` (NaN without a default), all on ``left_out``.
+    """A setting of a ``solver`` that was ``chosen`` on all cases except ``left_out``, and then applied to that case. On that case,
+    ``error`` is its error, ``best`` the smallest error of all compared settings, and ``default`` the error of the default, NaN
+    without a default.
     """
 
     solver: str
@@ -256,13 +261,13 @@ class Transfer:
 
     @property
     def loss(self) -> float:
-        """The ratio of the error to the ``best`` error, minus one: 0 if the chosen settings are the best on that case too."""
+        """The ratio of the error to the ``best`` error, minus one: 0 if the chosen setting is the best on that case too."""
         return self.error / self.best - 1
 
 
 def transfers(studies: Iterable[CaseStudy], error: str) -> tuple[Transfer, ...]:
-    """For every solver and case, the settings with the least mean logarithm of the error over the other cases, among those
-    measured on every case; an error below the bar of a truth counts as the bar.
+    """For every solver and left-out case, the setting with the smallest mean logarithm of the error over the other cases, out of
+    those measured on every case. An error below the bar of a truth counts as this bar.
     """
     by_solver: dict[str, dict[str, dict[str, float]]] = {}
     defaults: dict[tuple[str, str], float] = {}

@@ -1,4 +1,4 @@
-"""Current measures compared with a baseline and with the reference: a verdict on every statistic, from its decisive frame."""
+"""Comparison of current measures with a baseline and with the reference: a verdict on every statistic, from its decisive frame."""
 
 import math
 from collections.abc import Iterator
@@ -21,10 +21,11 @@ WORST_FIRST: tuple[Word, ...] = ("fail", "inconclusive", "pass")
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict on one ``question`` about the statistic ``name``, all numbers in ``unit`` and from the decisive frame.
+    """The verdict ``word`` on a ``question`` about the statistic ``name``, with values in ``unit`` at the decisive ``frame``.
 
-    ``was`` and ``current`` are its values, NaN if there is none; ``allowed`` is the maximum distance from its earlier value
-    (``unchanged``) or from the reference (``within``), NaN if unknown; ``known`` is the error bar of that comparison value.
+    ``was`` and ``current``: the earlier and the current value, NaN if there is none. ``allowed``: the maximum distance from the
+    earlier value (``unchanged``) or from the reference (``within``), NaN if unknown. ``known``: the error bar of the value with
+    which the current value is compared.
     """
 
     question: Question
@@ -50,7 +51,7 @@ class Judgement:
 
     @property
     def why(self) -> str:
-        """The reason in words."""
+        """The reason for the verdict, in words."""
         if math.isnan(self.was) and math.isnan(self.current):
             return "there is no number now, and there was none before"
         if math.isnan(self.current):
@@ -65,7 +66,7 @@ class Judgement:
 
     @property
     def _direction(self) -> str:
-        """Words for a change towards the reference or away from it."""
+        """A statement in words whether a change is towards the reference or away from it."""
         if self.question == "within" or self.name == MOVED or abs(self.current) == abs(self.was):
             return ""
         where = "nearer to" if abs(self.current) < abs(self.was) else "further from"
@@ -84,7 +85,7 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Check:
-    """All judgements on a ``candidate``, the worst first, ``notes`` on how to read them, and ``doubts`` about the reference."""
+    """All judgements on a ``candidate``, the worst first, with ``notes`` on how to read them and ``doubts`` about the reference."""
 
     case: str
     candidate: str
@@ -94,11 +95,11 @@ class Check:
 
     @property
     def word(self) -> Word:
-        """The combined verdict: a pass is doubtful if there are doubts about the reference."""
+        """The overall verdict; a pass is doubtful if there are doubts about the reference."""
         return judge.doubted(judge.overall(one.word for one in self.judgements), self.doubts)
 
     def answer(self, question: Question) -> Word:
-        """The verdict on one question."""
+        """The overall verdict on one ``question``."""
         return judge.overall(one.word for one in self.judgements if one.question == question)
 
     def count(self, word: Word) -> int:
@@ -111,7 +112,7 @@ def check(baseline: Baseline, current: CurrentMeasures) -> Check:
     found = [_moved(baseline.positions, current)]
     for name, stored in baseline.measures.items():
         found += _of_statistic(name, stored, current)
-    # Judgements of worse results come before judgements of results that merely differ.
+    # Judgements that results are too far from the reference come before judgements that they have merely changed.
     found.sort(
         key=lambda one: (WORST_FIRST.index(one.word), one.question != "within", one.name != MOVED, -one.used, one.name)
     )
@@ -120,7 +121,7 @@ def check(baseline: Baseline, current: CurrentMeasures) -> Check:
 
 
 class _Frames(NamedTuple):
-    """The frames (f,) of a statistic: its values in the baseline and now, its target, and its error bar."""
+    """The frames (f,) of a statistic: the values in the baseline, the current values, the target values, and the error bars."""
 
     was: Floats
     current: Floats
@@ -129,7 +130,7 @@ class _Frames(NamedTuple):
 
 
 def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
-    """Judge whether the sampled vertices are unchanged, by the maximum distance [mm] in each frame."""
+    """Judge whether the sampled vertices have stayed where they were, by the maximum distance [mm] in each frame."""
     was = positions.points(len(current.rest), "baseline")
     with np.errstate(over="ignore"):  # squares of huge distances overflow and count as infinite
         away = np.linalg.norm(current.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
@@ -139,8 +140,8 @@ def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
 
 
 def _of_statistic(name: str, stored: StoredStatistic, current: CurrentMeasures) -> Iterator[Judgement]:
-    """Judge whether a statistic is unchanged (the baseline is exact up to rounding), and whether it is within its allowed
-    distance from the reference, which is known up to its error bar.
+    """Judge whether a statistic is unchanged since the baseline, which is exact up to rounding, and whether its distance from the
+    reference, which is known up to its error bar, is allowed.
     """
     was, now, within = stored.numbers, current.values(name), math.nan if stored.within is None else stored.within
     rounding = np.full(len(was), 0.5 * 10.0 ** -PLACES[stored.unit])
@@ -153,7 +154,9 @@ def _of_statistic(name: str, stored: StoredStatistic, current: CurrentMeasures) 
 def _judged(
     question: Question, what: tuple[str, str], frames: _Frames, allowed: float, current: CurrentMeasures
 ) -> Judgement:
-    """Judge by the frame with the combined verdict that is farthest from its target or, if inconclusive, has the widest bar."""
+    """Judge all frames and return the judgement on the decisive frame. This is, among the frames with the overall verdict, the
+    frame farthest from its target or, if the verdict is inconclusive, the frame with the widest error bar.
+    """
     words = [_word(*map(float, row), allowed=allowed) for row in zip(*frames, strict=True)]
     word = judge.overall(words)
     deciding = frames.bars if word == "inconclusive" else np.abs(frames.current - frames.truth)
@@ -164,7 +167,7 @@ def _judged(
 
 
 def _word(was: float, value: float, truth: float, bar: float, *, allowed: float) -> Word:
-    """The verdict on one frame; inconclusive without a number before and now, fail if a number is new."""
+    """The verdict on one frame: inconclusive without a number before and now, and fail if a number is new."""
     if math.isnan(was) and math.isnan(value):
         return "inconclusive"
     if math.isnan(truth):
@@ -173,7 +176,7 @@ def _word(was: float, value: float, truth: float, bar: float, *, allowed: float)
 
 
 def _notes(baseline: Baseline, current: CurrentMeasures, found: list[Judgement]) -> Iterator[str]:
-    """Notes that explain the judgements, and name statistics that were not judged."""
+    """Notes that explain the judgements and name the statistics that were not judged."""
     if baseline.fem_reference != __version__:
         yield f"measured by fem_reference {__version__}, the baseline by {baseline.fem_reference}"
     if baseline.reference != current.reference_name:

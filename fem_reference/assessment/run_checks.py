@@ -24,17 +24,17 @@ from fem_reference.problems.setup import AttachedVertices, Bone
 from fem_reference.runs.contents import scalar_vectors, vector_names
 from fem_reference.runs.store import Run
 
-# A position is correct to this fraction of the body's size; the rounding of stored values is a thousandth of this.
+# The accuracy of positions as a fraction of the size of the body; the rounding of stored values is a thousandth of this.
 ROUNDING = 1e-9
 # Exactly attached vertices may be off their position on the bone by this strain (a stretch of 4) times their distance from facets.
 _STRAIN = 3.0
-# Safety factor on the mean extension of springs from the recorded force, as springs pull at other points of the surface.
+# Safety factor on the mean extension of springs that follows from the recorded force, as springs pull at other points.
 _SPRINGS = 1.5
-# The maximum rotation of a bone per load step, on average between two frames: beyond it the sense of rotation is unknown.
+# The maximum rotation of a bone per load step, on average between two frames; beyond it the sense of rotation is unknown.
 _TURN = 1.01 * math.pi / 2
-# Between contact points, a crease can penetrate by less of the spacing than a right-angled edge, ``BETWEEN``.
+# The penetration of a crease between contact points, as a fraction of the spacing; less than at a right-angled edge, ``BETWEEN``.
 _CREASE = 0.1
-# Self-contact of a part allows a penetration of less than this fraction of the spacing, for any recorded pressure.
+# The penetration that self-contact of a part allows, for any recorded pressure, is less than this fraction of the spacing.
 _OWN = 0.5
 # A bone that penetrates by more than this fraction of half its thickness has broken through contact, whatever the stiffness.
 _GIVEN_WAY = 0.75
@@ -44,7 +44,7 @@ BALANCE = 10.0
 
 @dataclass(frozen=True)
 class RunCheck:
-    """A check by ``name``: the ``value`` at a ``frame`` and ``place``, and the maximum ``allowed`` value, both in ``unit``."""
+    """The check ``name``: the ``value`` at a ``frame`` and ``place``, and the maximum ``allowed`` value, both in ``unit``."""
 
     name: str
     value: float
@@ -70,12 +70,12 @@ class RunCheck:
 
 
 RunChecks = tuple[RunCheck, ...]
-# Positions (n, 3) [mm] by frame number.
+# A function from a frame number to positions (n, 3) [mm], None if they are unknown.
 Nodes = Callable[[int], Floats | None]
 
 
 def of_body(body: Body, solved: Run) -> RunChecks:
-    """Check that states exist, are finite and agree with exact prescriptions, and that parts that may touch do not cross."""
+    """Check that all states exist, are finite and agree with exact prescriptions, and that parts that may touch do not cross."""
     numbers, points = tuple(state.number for state in solved.states), [state.points for state in solved.states]
     found = (_complete(body.frames, numbers), _finite(numbers, points))
     if not all(one.met for one in found):
@@ -98,7 +98,7 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch; allowed are smoothing, compliance, gaps between points, and overlap remaining from rest."""
+    """Overlap of parts that may touch; smoothing, compliance, gaps between points and overlap remaining from rest are allowed."""
     for law in body.touching:
         edge, between, depth = longest_edge(body.mesh, law), unseen(body.mesh, law), partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
@@ -111,8 +111,8 @@ def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:
-    """Check that all frames exist, in order and finite; attachments are at their bones; load steps are small enough; forces
-    balance; and neither a bone nor the surface is crossed. ``nodes``: the points of the tetrahedra, if known.
+    """Check that all frames exist in order and are finite, that attachments are at their bones, that load steps are small enough,
+    that forces balance, and that the surface crosses neither a bone nor itself. ``nodes``: the points of the tetrahedra, if known.
     """
     fibres = [] if run.fibre_positions is None else [run.fibre_positions]
     arrays = [np.concatenate([array[i] for array in (run.positions, *fibres)]) for i in range(len(run.numbers))]
@@ -128,7 +128,7 @@ def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -
 
 
 def worst(checks: Iterable[RunCheck]) -> RunChecks:
-    """For each name, the check that is nearest to its allowed value, or exceeds it most."""
+    """The check of each name that is nearest to its allowed value, or exceeds it most."""
     found = dict[str, RunCheck]()
     for one in checks:
         if one.name not in found or one.share > found[one.name].share:
@@ -162,8 +162,8 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
 
 
 def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
-    """Exact attachments: the distance of vertices from their position on the bone; allowed is a strain times their distance from
-    the attached facets. Springs: the mean extension; allowed is the force, in situ also that at rest, over stiffness and area.
+    """The distance of exactly attached vertices from their positions on the bone: a strain times their distance from attached
+    facets is allowed. For springs, the mean extension: force (in situ, plus that at rest) over stiffness and area is allowed.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets = Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])
@@ -185,7 +185,7 @@ def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iter
 
 
 def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """Rotation and travel of a bone per load step, on average between two frames; skips frames that needed no step."""
+    """The rotation or travel of a bone per load step, on average between two frames; frames that needed no step are skipped."""
     counts = run.scalars.get("load_steps", np.full(len(run.numbers), np.nan))
     contact, attached = problem.contact, {entry.bone.name for entry in problem.attached}
     bones = [bone for bone in problem.bones if bone.name in attached or (contact and contact.is_by(bone.name))]
@@ -201,14 +201,14 @@ def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
 
 
 def _travel(motion: RigidMotion, before: float, after: float) -> float:
-    """Travel of a bone between two frames [rad or mm]; both directions of a motion out and back count."""
+    """The travel [rad or mm] of a bone between two frames; if it moves out and back, both directions count."""
     stops = [before, *(frame for frame in motion.frames if before < frame < after), after]
     return float(np.abs(np.diff(np.interp(stops, motion.frames, motion.amounts))).sum())
 
 
 def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """The sums of forces and of moments that bones exert on the muscle, by attachments and contact: 0 without external loads, else
-    in balance with these. A user's own effect may be a load, so there is no check with such effects.
+    """The sums of the forces and of the moments that bones exert on the muscle, by attachments and contact. They should be 0
+    without external loads, otherwise in balance with the loads. A user's own effects may be loads, so with them there is no check.
     """
     residual = BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
     allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
@@ -226,7 +226,7 @@ def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
 
 
 def _loads(problem: MuscleProblem, run: Run, kind: str) -> Iterator[tuple[int, Floats]]:
-    """The sums (3,) of external loads by frame index: as recorded, or of forces that do not depend on the deformation."""
+    """Frame index and sum (3,) of external loads: as recorded, or computed for forces that do not depend on the deformation."""
     if f"load_{kind}_x" in run.scalars:
         yield from enumerate(scalar_vectors(run.scalars, "load_", kind))
     for i, number in enumerate(run.numbers if kind == "force" else ()):
@@ -235,7 +235,7 @@ def _loads(problem: MuscleProblem, run: Run, kind: str) -> Iterator[tuple[int, F
 
 
 def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
-    """Index and number of the frames whose positions of muscle and ``bones`` differ from rest and from all earlier frames."""
+    """Index and number of each frame in which muscle and ``bones`` are not where they were at rest or in an earlier frame."""
     seen, near = [(np.array([np.eye(4) for _ in bones]), run.surface.points)], ROUNDING * diagonal(run.surface.points)
     for i, number in enumerate(run.numbers):
         poses, points = np.array([bone.pose(number) for bone in bones]), run.positions[i]
@@ -247,8 +247,8 @@ def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
 
 
 def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
-    """Penetration of the muscle and each bone in contact. If the surface, with possibly large triangles, penetrates too deeply,
-    the boundary of the tetrahedra is checked too: the check fails if both penetrate too deeply.
+    """The penetration of the muscle and each bone in contact. If the surface, whose triangles may be large, penetrates too deeply,
+    the boundary of the tetrahedra is checked too; the check fails only if both penetrate too deeply.
     """
     rest, apart = run.surface, spacing(problem.surface)
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
@@ -265,7 +265,7 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 
 
 def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
-    """Overlap of bone and muscle. Above ``give`` only the excess over rest counts; near the middle of the bone it always fails."""
+    """The overlap of bone and muscle. Above ``give`` only the excess over rest counts; deep inside the bone it always fails."""
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:
@@ -281,14 +281,14 @@ def _at_rest(muscle: Surface, bone: Bone) -> Depths:
 
 
 def give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> float:
-    """The allowed penetration [mm] under a ``pressure`` [MPa], for contact points half of ``apart`` [mm] apart."""
+    """The allowed penetration [mm] under a ``pressure`` [MPa], with contact points at a spacing of half of ``apart`` [mm]."""
     assert problem.contact is not None  # called only with contact
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
     return pressure / problem.contact.stiffness + known + BETWEEN * apart
 
 
 def _creases(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """Self-penetration of the muscle's surface in excess of rest; with self-contact, the penetration that it allows is accepted."""
+    """The self-penetration of the muscle's surface in excess of rest. The penetration that self-contact allows is accepted."""
     surface, law, none = run.surface, touching.among(problem.effects), np.zeros(len(run.numbers))
     pressure = np.nan_to_num(run.scalars.get("touching_pressure", none)) / (law.stiffness if law else np.inf)
     most = _OWN * (apart := spacing(surface))

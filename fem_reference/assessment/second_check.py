@@ -1,4 +1,4 @@
-"""The second check of states that a solver calls converged. A run that it denies has the status ``denied`` and is never a truth."""
+"""The second check of states that a solver calls converged. A run that it denies has the status ``denied`` and is no truth."""
 
 import hashlib
 import logging
@@ -31,7 +31,7 @@ RECORD = "second_check"
 
 
 def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
-    """A converged ``outcome``, denied if one of the ``checks`` is not met."""
+    """The ``outcome``, denied if it is converged and one of the ``checks`` is not met."""
     lost = [str(one) for one in checks if not one.met]
     if not lost or outcome.status != "converged":
         return outcome
@@ -39,7 +39,7 @@ def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
 
 
 def confirmed_run(problem: Callable[[], MuscleProblem | MusclesProblem], run: Run) -> Run:
-    """The ``run`` after the second check, which is stored in its origin; unchanged if this code has checked it before."""
+    """The ``run`` after the second check, with the checks stored in its origin; unchanged if this code has checked it before."""
     sources = b"".join(Path(str(one.__file__)).read_bytes() for one in (run_checks, neighbours, interpenetration))
     stored, code = run.origin.get(RECORD, {}), hashlib.sha256(sources).hexdigest()[:16]
     if stored.get("code") == code:
@@ -58,14 +58,15 @@ def confirmed_run(problem: Callable[[], MuscleProblem | MusclesProblem], run: Ru
 
 
 def trusted(problem: Callable[[], MuscleProblem | MusclesProblem], run: Run) -> bool:
-    """True for a run that converged, and for one that ended early if the frames that it reached pass the second check."""
+    """True for a run that converged, and for a run that ended early if the frames that it reached pass the second check."""
     status = run.outcome.status
     return status == "converged" or (status != "denied" and all(one.met for one in _of_all(problem(), run)))
 
 
 def _of_all(problem: MuscleProblem | MusclesProblem, run: Run, nodes: Nodes | None = None) -> RunChecks:
-    """The checks of a muscle's ``run``, which may have ended early; for several muscles, the checks of each under its name, and
-    the check that none is inside another. ``nodes``: by default those in the folder of the run.
+    """The checks of a muscle's ``run``, which may have ended early. For several muscles, the checks of each muscle under its name,
+    and the check that no muscle is inside another. ``nodes``: the points of the tetrahedra, by default those in the folder of the
+    run.
     """
     at = nodes or (lambda number: None if run.folder is None else places(run.folder, number)[1])
     if isinstance(problem, MuscleProblem):
@@ -89,7 +90,7 @@ def _displacement(run: Run, number: int) -> Floats | None:
 def confirmed_frames(
     problem: MuscleProblem | MusclesProblem, frames: Sequence[Frame], outcome: Outcome, settings: Record
 ) -> Outcome:
-    """The ``outcome`` of ``frames`` of muscles in memory, denied if the check denies that they converged."""
+    """The ``outcome`` of ``frames`` of muscles in memory, denied if it is converged and the second check is not passed."""
     if outcome.status != "converged":
         return outcome
     run = replace(collected(frames, outcome, problem.rest), origin={"settings": settings.model_dump(mode="json")})
@@ -98,14 +99,14 @@ def confirmed_frames(
 
 
 def texts_of(run: Run) -> tuple[str, ...]:
-    """The checks stored with a ``run``, in words, the checks that deny it first; empty for an unchecked run."""
+    """The checks stored with a ``run``, in words; checks that deny the run come first. Empty if the run was not checked."""
     found = run.origin.get(RECORD, {}).get("checks", [])
     texts = [str(RunCheck(**{key: value for key, value in one.items() if key != "met"})) for one in found]
     return tuple(text for met in (False, True) for text, one in zip(texts, found, strict=True) if one["met"] is met)
 
 
 def confirmed_body(body: Body, solved: Run) -> Run:
-    """A solution of a ``body``, denied if the check denies that it converged."""
+    """The run ``solved`` of a ``body``, denied if it converged and does not pass the second check."""
     if solved.outcome.status != "converged":
         return solved
     return replace(solved, outcome=confirmed(solved.outcome, (*of_body(body, solved), *worst(balance(body, solved)))))

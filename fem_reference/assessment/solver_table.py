@@ -1,4 +1,4 @@
-"""The kinds of solvers in Table 5.1 of the report, and the results of their solvers on scenes."""
+"""The kinds of solvers in Table 5.1 of the report, and the results of solvers of these kinds on scenes."""
 
 import tomllib
 from collections.abc import Mapping
@@ -17,8 +17,10 @@ FILE = Path(__file__).with_suffix(".toml")
 
 
 class SolverKind(Record):
-    """A row of the report's table: its ``name``, the ``form`` of its model, the report's ``speed`` and ``precision`` in plus and
-    minus signs, the numbers of its ``literature`` in the report, and ``of_case``, the names of candidates that represent it.
+    """A row of the report's table.
+
+    ``form``: the form of the model. ``speed`` and ``precision``: the ratings in the report, in plus and minus signs.
+    ``literature``: the citation numbers in the report. ``of_case``: the names of the candidates that represent this kind.
     """
 
     name: str
@@ -30,7 +32,7 @@ class SolverKind(Record):
 
 
 class ReportSpeed(Record):
-    """The iterations per second of the report's program on a case, and the source of that number."""
+    """The iterations per second of the report's program on a ``case``, and the ``source`` of this value."""
 
     case: str
     per_second: float = Field(gt=0)
@@ -58,9 +60,12 @@ def _file() -> _File:
 
 @dataclass(frozen=True, eq=False)
 class SolverResult:
-    """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time per frame [s] if known, and ``measures`` against
-    the reference; for the reference itself its error bars, empty if these were not requested. ``needs``: the number of parameters
-    that a user must give, by kind; empty if unknown. ``unsound``: the reason why its frames are unusable, else empty.
+    """The result of a solver (``kind``, ``name``, ``solver``) on a ``case``.
+
+    ``seconds_per_frame``: the time per frame [s], None if unknown. ``measures``: the measures against the reference; for the
+    reference itself (``of_reference``) its error bars, empty if these were not requested. ``numbers``: the frame numbers.
+    ``needs``: the number of parameters that a user must give, by kind, empty if unknown. ``unsound``: the reason why its frames are
+    unusable, otherwise empty.
     """
 
     kind: str
@@ -77,14 +82,18 @@ class SolverResult:
     unsound: str = ""
 
     def worst(self, metric: str, statistic: str) -> tuple[float, int] | None:
-        """The value of greatest magnitude over the frames and its frame; NaN if any frame is NaN, None without the measure."""
+        """The value with the largest magnitude over the frames, and its frame number. The value is NaN if the value of any frame is
+        NaN. None if the statistic was not measured.
+        """
         found = find(self.measures, metric, statistic)
         return None if found is None else (found.worst.value, self.numbers[found.worst.index])
 
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A scene: ``title``, ``triangles`` of the muscle, maximum displacement ``travel`` [mm] and outcome of the reference."""
+    """A scene: its ``title``, the number of ``triangles`` of the muscle, the maximum displacement (``travel`` [mm]) in the
+    reference, and the outcome of the ``reference``.
+    """
 
     case: str
     title: str
@@ -95,8 +104,10 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Overall:
-    """A solver's worst frames over scenarios: the ``median`` of their magnitudes over the ``count`` scenarios in which every frame
-    has a number, the ``worst`` of these magnitudes and its ``case``, and the ``lost`` cases, on which the solver failed.
+    """A statistic of a solver in its worst frame of each scenario.
+
+    ``median``: the median of the magnitudes over the ``count`` scenarios in which the value is known in every frame. ``worst`` and
+    ``case``: the value with the largest magnitude, and its case. ``lost``: the cases on which the solver failed.
     """
 
     median: float
@@ -108,7 +119,7 @@ class Overall:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """The ``results`` of solvers on ``scenarios``; ``missing``: by case, why it is left out; the ``machines`` of the runs."""
+    """The ``results`` of solvers on ``scenarios``; ``missing``: by case, why it was left out; ``machines``: those of the runs."""
 
     kinds: tuple[SolverKind, ...]
     scenarios: tuple[Scenario, ...]
@@ -118,11 +129,11 @@ class Table:
     machines: tuple[str, ...]
 
     def _by(self, kind: str, name: str) -> list[SolverResult]:
-        """The results of a solver."""
+        """The results of the solver ``name`` of a ``kind``."""
         return [one for one in self.results if (one.kind, one.name) == (kind, name)]
 
     def of(self, kind: str, case: str) -> list[SolverResult]:
-        """The results of a kind on a case."""
+        """The results of all solvers of a ``kind`` on a ``case``."""
         return [one for one in self.results if (one.kind, one.case) == (kind, case)]
 
     def names(self, kind: str) -> list[str]:
@@ -130,12 +141,12 @@ class Table:
         return list(dict.fromkeys(one.name for one in self.results if one.kind == kind))
 
     def needs(self, kind: str, name: str) -> Mapping[str, int]:
-        """The number of parameters, by kind, that ``name`` needs on the scene that needs most; empty if unknown."""
+        """The number of parameters that ``name`` needs, by kind, on the scene that needs the most parameters; empty if unknown."""
         found = [one.needs for one in self._by(kind, name)]
         return max(found, key=lambda needs: sum(needs.values()), default={})
 
     def over(self, kind: str, name: str, metric: str, statistic: str) -> "Overall | None":
-        """The worst frames of ``name`` over all scenarios; None if it was not measured."""
+        """The worst frames of ``name`` over all scenarios; None if the statistic was not measured."""
         mine = self._by(kind, name)
         found = [(value[0], one.case) for one in mine if (value := one.worst(metric, statistic)) is not None]
         finite = [(value, case) for value, case in found if not np.isnan(value)]
@@ -146,7 +157,7 @@ class Table:
         return Overall(float(np.median([abs(value) for value, _ in finite])), worst, case, len(finite), lost)
 
     def rankings(self, case: str) -> tuple[Ranking, ...]:
-        """The order of solvers on a case, as far as the reference's error bars separate them; empty without bars."""
+        """The rankings of solvers on a ``case``, as far as the error bars of the reference separate them; empty without bars."""
         here = [one for one in self.results if one.case == case]
         bars = [measure for one in here if one.of_reference for measure in one.measures]
         return rankings({one.name: one.measures for one in here if not (one.of_reference or one.unsound)}, bars)

@@ -1,4 +1,4 @@
-"""Reasons why the frames of a candidate are unusable, although every number is finite; such a candidate is not ranked."""
+"""Reasons why the frames of a candidate are unusable although every number is finite. Such a candidate is not ranked."""
 
 import numpy as np
 
@@ -6,20 +6,20 @@ from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume
 from fem_reference.geometry.distance import outer_windings
 from fem_reference.runs.store import Run
 
-# The ratio of enclosed volume to that of the reference: below the first value the body has collapsed, above the second it has
-# exploded. The lowest ratio of the shipped solvers is 0.8.
+# Limits of the ratio of the enclosed volume to that in the reference: below the first the body has collapsed, above the second it
+# has exploded. The lowest ratio of the shipped solvers is 0.8.
 _LEAST, _MOST = 0.5, 2.0
 # The maximum distance of a vertex from the reference, as a multiple of the size of the body.
 _FARTHEST = 1.0
-# The fraction of triangles that may be inside out, in excess of that fraction in the reference.
+# The maximum fraction of triangles that are inside out, in excess of the fraction in the reference.
 _TURNED = 0.05
-# A vertex is stuck if it moves by less than the first fraction of the body's size, and in the reference by more than the second.
+# A vertex is stuck if it moves by less than the first fraction of the body's size, but by more than the second in the reference.
 _STILL, _MOVES = 1e-6, 1e-2
 
 
 def unsound(run: Run, reference: Run) -> str:
-    """The first reason why the frames of a ``run`` are unusable, with its frame; empty if there is none, and for a run without the
-    reference's surface. Only frames that both runs reached count.
+    """The first reason why the frames of a ``run`` are unusable, with its frame; empty if there is none, or if the run does not
+    have the surface of the reference. Only frames that both runs reached are judged.
     """
     if not run.has_surface or run.positions.shape != reference.positions.shape:
         return ""  # a run of lines, or of another surface
@@ -33,7 +33,7 @@ def unsound(run: Run, reference: Run) -> str:
 
 
 def _of_frame(run: Run, mine: Floats, truth: Floats) -> str:
-    """The reason at a frame, from positions (n, 3) [mm]; empty if there is none."""
+    """The reason in a frame, from positions (n, 3) [mm] in the run (``mine``) and the reference (``truth``); empty if none."""
     triangles, size = run.surface.triangles, diagonal(run.surface.points)
     away = float(np.linalg.norm(mine - truth, axis=1).max())
     if not away <= _FARTHEST * size:
@@ -50,7 +50,7 @@ def _inside_out(run: Run, points: Floats) -> float:
 
 
 def _stuck(mine: Floats, truth: Floats) -> str:
-    """The reason if vertices do not move in any frame although the reference moves them, as when a solver drops elements."""
+    """The reason if vertices never move although they move in the reference, as happens if a solver drops elements."""
     size = diagonal(truth[0])
     moved, wanted = (np.linalg.norm(one - one[0], axis=2).max(axis=0) / size for one in (mine, truth))
     stuck = (moved < _STILL) & (wanted > _MOVES)

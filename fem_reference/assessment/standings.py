@@ -1,4 +1,4 @@
-"""Rows of standings: the result of each solver on each case, with provenance; stale rows, and changes of standings."""
+"""Standings: the result of each solver on each case, with its provenance; stale rows; and changes between standings."""
 
 import math
 from collections.abc import Collection, Iterable, Sequence
@@ -10,22 +10,25 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, parse
 from fem_reference.io import texts
 
-# The version of the method of measurement: rows of another version are stale.
+# The version of the method of measurement. Rows of another version are stale.
 PROTOCOL = 3
 STATES = ("failed", "stale")
-# The statistic by which rows are compared [mm], and the same in per cent; the error [mm] and time [s] at which solvers are
+# The statistic by which rows are compared, in mm and in per cent; and the error [mm] and the time [s] at which solvers are
 # compared.
 ERROR, SHARE = "surface_deviation.rms", "surface_deviation.rms_percent"
 MATCHED_ERROR, MATCHED_TIME = 2.0, 0.1
 
 
 class Standing(Record):
-    """A solver ``name`` of a ``group`` on a ``case``. ``worst``: by ``metric.statistic`` its maximum deviation over the frames,
-    empty for the reference, which has ``bars``. ``from_rest``: rms distance [mm] of the last frame from the first, if the reference
-    is back at rest there. ``unsound``: the reason why its frames are unusable. ``split``: root mean squares [mm] of the parts of
-    its error. ``least_error``: the error [mm], if the time is at most the matched time; ``least_time``: the time [s], if the error
-    is at most the matched error. ``truth``, ``run``: keys of the two runs; ``frames``: a hash of the positions. ``stale``: True if
-    case, reference, solver, protocol or time limit changed after the ``date``; ``time_limit``: the allowed processor time [s].
+    """The result of the solver ``name`` of a ``group`` on a ``case``.
+
+    ``worst``: by ``metric.statistic``, the maximum deviation over the frames; empty for the reference, which has error ``bars``.
+    ``from_rest``: the rms distance [mm] of the last frame from the first, if the reference is back at rest in the last.
+    ``unsound``: the reason why the frames are unusable. ``split``: the root mean squares [mm] of the parts of the error.
+    ``least_error``: the error [mm] if the time is at most the matched time. ``least_time``: the time [s] if the error is at most
+    the matched error. ``truth`` and ``run``: the keys of the reference and of the run. ``frames``: a hash of the positions.
+    ``stale``: True if case, reference, solver, protocol or time limit have changed since the ``date``. ``time_limit``: the allowed
+    processor time [s].
     """
 
     case: str
@@ -53,30 +56,30 @@ class Standing(Record):
 
     @property
     def failed(self) -> bool:
-        """True if the row is not to be ranked."""
+        """True if the row cannot be ranked."""
         return self.status != "converged" or bool(self.unsound)
 
     @property
     def ended(self) -> str:
-        """The end of the run in words: the reason why its frames are unusable, the limit that it exceeded, or its status."""
+        """The end of the run in words: the reason why its frames are unusable, the time limit that it exceeded, or its status."""
         late = self.status == "timed out" and self.time_limit is not None
         return self.unsound or (f"not within {self.time_limit:g} s" if late else self.status)
 
     def is_of(self, truth: str, run: str) -> bool:
-        """True if the row was measured by this protocol, on runs with these keys."""
+        """True if the row was measured by the present protocol, on runs with these keys."""
         return (self.truth, self.run, self.protocol) == (truth, run, PROTOCOL)
 
     def kept(self, missing: bool) -> "Standing":
-        """The row if its case was not measured again; ``missing``: True if measuring it was not possible."""
+        """The row of a case that was not measured again, marked if it is stale; ``missing``: True if it could not be measured."""
         return self.model_copy(update={"stale": self.stale or missing or self.protocol != PROTOCOL})
 
     def asked(self, only: Collection[str]) -> bool:
-        """True if the row should be measured again: if it is in one of the states ``only``, or if these are empty."""
+        """True if the row should be measured again: if it is in one of the states ``only``, or if no states are given."""
         return not only or ("failed" in only and self.failed) or ("stale" in only and self.stale)
 
 
 class Standings(Record):
-    """The ``rows``; ``missing``: by case, or case and solver, why there is no row; ``changes`` since the last standings."""
+    """The ``rows``; ``missing``: by case, or case and solver, why there is no row; ``changes`` since the previous standings."""
 
     rows: tuple[Standing, ...]
     missing: dict[str, str]
@@ -89,7 +92,7 @@ class Standings(Record):
         return list(dict.fromkeys(row.case for row in self.rows))
 
     def of(self, case: str) -> list[Standing]:
-        """The rows of a case, by group and error; failed rows come last in their group, in no order."""
+        """The rows of a case, by group and error; the failed rows come last in their group, in no particular order."""
         groups = list(dict.fromkeys(row.group for row in self.rows))
         return sorted(
             (row for row in self.rows if row.case == case),
@@ -97,7 +100,7 @@ class Standings(Record):
         )
 
     def overall(self) -> list["OverCases"]:
-        """Every solver over its cases, without stale rows, in order of group, fraction of solved cases, and error."""
+        """A summary of every solver over its cases, without stale rows, in order of group, fraction of solved cases, and error."""
         rows = [row for row in self.rows if not row.stale]
         solvers = dict.fromkeys((row.group, row.name) for row in rows)
         found = [OverCases.of([row for row in rows if (row.group, row.name) == one]) for one in solvers]
@@ -107,8 +110,8 @@ class Standings(Record):
 
 @dataclass(frozen=True)
 class OverCases:
-    """A solver over ``count`` cases: the medians of its error in per cent of the travel (``share``, NaN for the reference) and of
-    its time [s], and the cases ``lost``, on which it failed.
+    """A solver over ``count`` cases. ``share``: the median of its error, in per cent of the maximum displacement; NaN for the
+    reference. ``seconds``: the median of its time [s]. ``lost``: the cases on which it failed.
     """
 
     group: str
@@ -135,7 +138,7 @@ def _error(row: Standing, name: str) -> float:
 
 
 def load(path: Path) -> tuple[Standing, ...]:
-    """The rows of standings that were written to ``path``; none if there is no file. InputError for any other file."""
+    """The rows of the standings in ``path``; empty if there is no file. InputError if the file does not contain standings."""
     if not path.exists():
         return ()
     found = texts.read_json(path, "standings written by the verb standings")
@@ -145,7 +148,9 @@ def load(path: Path) -> tuple[Standing, ...]:
 
 
 def changes(before: Iterable[Standing], after: Iterable[Standing]) -> tuple[str, ...]:
-    """New rows, missing rows, changes of status, and errors changed by more than their bar, in words; empty without ``before``."""
+    """The changes from the rows ``before`` to the rows ``after``, in words: new rows, missing rows, changes of status, and errors
+    that changed by more than their error bar. Empty if there were no rows before.
+    """
     old, new = ({(row.case, row.name): row for row in rows} for rows in (before, after))
     if not old:
         return ()

@@ -1,4 +1,4 @@
-"""Results of hard cases: a cell for each case and solver, with its verdict and the evidence."""
+"""Results of hard cases: a cell for each case and solver, with the verdict and the evidence for it."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 
 class Bound(Record):
-    """A bound that healthy runs meet: a ``quantity`` of :mod:`health` is at most ``at_most`` in every or the ``last`` frame."""
+    """A bound that a healthy run satisfies: a ``quantity`` of :mod:`health` is at most ``at_most`` in every or the last frame."""
 
     quantity: str
     at_most: float = Field(ge=0)
@@ -27,8 +27,8 @@ class Bound(Record):
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """A quantity over frames: ``values`` (f,) in ``unit`` at frame ``numbers``, ``where``: the worst point of each in words;
-    ``points`` (f, 3) [mm]: the worst points, for a quantity with a place.
+    """A ``quantity`` over the frames: its ``values`` (f,) in ``unit`` at frame ``numbers``. ``where``: the worst point of each
+    frame in words. ``points`` (f, 3) [mm]: the positions of the worst points, None for a quantity without a position.
     """
 
     quantity: str
@@ -39,7 +39,7 @@ class History:
     points: Floats | None = None
 
     def worst(self, frame: Literal["any", "last"]) -> int:
-        """The index of the decisive frame; a value that is not a number is the worst."""
+        """The index of the decisive frame, the last or that with the largest value; a value that is not a number is the largest."""
         if frame == "last":
             return len(self.values) - 1
         return int(np.argmax(np.where(np.isnan(self.values), np.inf, self.values)))
@@ -47,7 +47,7 @@ class History:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A picture: ``points`` (n, 3) [mm] of ``triangles`` (m, 3) at a frame, and the ``place`` (3,) that is marked."""
+    """A picture of ``triangles`` (m, 3) with ``points`` (n, 3) [mm] at a frame, and the position (3,) of a mark (``place``)."""
 
     points: Floats
     triangles: Ints
@@ -56,8 +56,10 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """A hard case by a solver: the verdict, a sentence on the result, the status of the run (empty without a run), the decisive
-    quantity's ``value``, ``bound`` and ``history``, the index ``at`` of its decisive frame, and a picture of the worst point.
+    """The result of a ``solver`` on a hard case: the ``verdict`` and a ``sentence`` on the result.
+
+    ``status``: the status of the run, empty without a run. ``quantity``, ``value`` and ``bound``: the decisive quantity, with its
+    ``history`` and the index of its decisive frame (``at``). ``scene``: a picture of the worst point.
     """
 
     case: str
@@ -77,7 +79,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class HardCase:
-    """A row: the name, the title, and the signs of a healthy run, in words and as numerical bounds."""
+    """A hard case: its ``name``, its ``title``, and signs of a healthy run, in words (``healthy``) and as numerical ``bounds``."""
 
     name: str
     title: str
@@ -87,7 +89,7 @@ class HardCase:
 
 @dataclass(frozen=True, eq=False)
 class Stress:
-    """All cells, the cases and the solvers in the order of the page; ``origin``: provenance."""
+    """All ``cells``, with the ``cases`` and the ``solvers`` in the order of the page. ``origin``: the provenance."""
 
     cases: tuple[HardCase, ...]
     solvers: tuple[str, ...]
@@ -110,8 +112,11 @@ Weighed = Sequence[tuple[Bound, History]]
 
 
 def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
-    """``cell``, for a run that reached every frame, with the verdict by its first violated bound, else by the first bound. A
-    value that is not finite fails. ``contrast``: the reason if a bound should be violated; then a run fails if none is.
+    """The ``cell`` of a run that reached every frame, with its verdict.
+
+    The verdict follows from the first bound that is violated or, if none is, from the first bound. A value that is not finite
+    fails. ``contrast``: the reason why the run should violate a bound, empty if it should not. A run that should do so, but does
+    not, fails.
     """
     shown = _decisive(cell, weighed)
     if shown.value is None or shown.bound is None or not np.isfinite(shown.value):
@@ -124,8 +129,10 @@ def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
 
 
 def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> Cell:
-    """``cell``, for a run that did not reach every frame: failed; or no solution if it ended at a limit point, or reached some
-    frames of a case that has ``no_solution``, for the given reason.
+    """The ``cell`` of a run that did not reach every frame: failed, with two exceptions.
+
+    The verdict is "no solution" if the run ended at a limit point. It is the same if ``no_solution`` gives a reason why the case
+    has no solution, the run reached some frames, and it neither timed out nor crashed and was not denied.
     """
     shown = _decisive(cell, weighed)
     if cell.status == "limit point":
@@ -137,7 +144,7 @@ def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> 
 
 
 def doubted(cell: Cell, doubt: str, no_solution: str) -> Cell:
-    """``cell`` with a ``doubt`` about the solver's result, if any: degraded, or no solution if this is expected."""
+    """The ``cell`` in view of a ``doubt`` about the solver's result ("" for none): degraded, or no solution if that is expected."""
     if not doubt or cell.verdict != "ok":
         return cell
     if no_solution:
@@ -146,7 +153,7 @@ def doubted(cell: Cell, doubt: str, no_solution: str) -> Cell:
 
 
 def _decisive(cell: Cell, weighed: Weighed) -> Cell:
-    """``cell`` with the first quantity that violates its bound, else the first of all."""
+    """The ``cell`` with the first quantity that violates its bound or, if none does, with the first quantity."""
     values = [(bound, history, history.worst(bound.frame)) for bound, history in weighed]
     bound, history, i = next((one for one in values if not one[1].values[one[2]] <= one[0].at_most), values[0])
     where = f" {history.where[i]}" if history.where else ""
@@ -169,7 +176,7 @@ def _decisive(cell: Cell, weighed: Weighed) -> Cell:
 
 
 def facts(stress: Stress) -> dict[str, Any]:
-    """The contents of pages, except pictures, as valid JSON."""
+    """The contents of pages, without pictures, as valid JSON."""
     cells = [{name: value for name, value in vars(cell).items() if name not in _PICTURED} for cell in stress.cells]
     return {
         "format": 1,

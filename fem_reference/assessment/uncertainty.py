@@ -1,4 +1,4 @@
-"""Records of uncertainty: the band of a case's results for unknown parameters, its sensitivities, and candidates in the band."""
+"""Records of uncertainty: the band of a case's results with unknown parameters, its sensitivities, and candidates in the band."""
 
 import math
 from dataclasses import dataclass, field
@@ -17,7 +17,9 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a case: its ``key``, its ``title`` in words, its value in the case (``nominal``) and range, in ``unit``."""
+    """A parameter of a case: its ``key``, its ``title`` in words, its value in the case (``nominal``), and its range from ``low``
+    to ``high``, all in ``unit``. ``spread``: the distribution over the range. ``source``: the source of the range.
+    """
 
     key: str
     title: str
@@ -30,11 +32,11 @@ class Parameter:
 
     @property
     def contains(self) -> bool:
-        """True if the case's own value is within the range."""
+        """True if the value in the case is within the range."""
         return self.low <= self.nominal <= self.high
 
     def value(self, place: float) -> float:
-        """The value at a ``place`` in the range, from -1 to 1, rounded to six digits.
+        """The value at a ``place`` in the range, from -1 (low end) to 1 (high end), rounded to six digits.
 
         >>> Parameter("k", "k", "", 1.0, 1.0, 100.0, "log-uniform", "").value(0.0)
         10.0
@@ -42,14 +44,14 @@ class Parameter:
         return float(f"{self.at((place + 1) / 2):.6g}")
 
     def at(self, share: float) -> float:
-        """The value at the fraction ``share`` of the range, from 0 to 1 or beyond; :meth:`place` is its inverse."""
+        """The value at the fraction ``share`` of the range, from 0 to 1 or beyond; :meth:`place` is the inverse function."""
         if self.spread == "log-uniform":
             with np.errstate(over="ignore"):
                 return float(np.exp(math.log(self.low) + share * math.log(self.high / self.low)))
         return float(self.low + share * (self.high - self.low))
 
     def place(self, value: float) -> float:
-        """The fraction of the range below a ``value``."""
+        """The fraction of the range that lies below a ``value``."""
         if self.spread == "log-uniform":
             return math.log(value / self.low) / math.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
@@ -57,7 +59,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Failure:
-    """A run of the design without a result: its parameters by key, and the reason."""
+    """A run of the design without a result: its parameters (``values``) by key, and the reason (``status`` and ``message``)."""
 
     values: dict[str, float]
     status: str
@@ -66,14 +68,16 @@ class Failure:
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """The band of a ``quantity`` over frame ``numbers`` (f,), in ``unit``: 5th percentile ``low``, ``median`` and 95th percentile
-    ``high`` (f,), and the result of the case, ``nominal``; NaN if the quantity is not defined. ``bar`` (f,): the numerical error
-    bar of this result, None if it has none. ``distance``: True for a distance from this result; smaller values are always inside.
+    """The band of a ``quantity`` over frame ``numbers`` (f,), in ``unit``.
 
-    ``error``: the error of the surrogate, as a fraction of the variance, at runs excluded from its fit; NaN without a surrogate.
-    ``by``: the source of the percentiles, Gaussian ``"process"`` or ``"runs"``; ``refused``: the reason why there is no band.
-    ``first`` and ``total``: the fractions of the variance over all frames that are due to each parameter, by its key; empty if the
-    surrogate is not accurate enough (``unreliable``).
+    ``low``, ``median`` and ``high`` (f,): the 5th, 50th and 95th percentile. ``nominal`` (f,): the result of the case. All are NaN
+    in frames in which the quantity is not defined. ``bar`` (f,): the numerical error bar of the result of the case, None if it has
+    none. ``distance``: True if the quantity is a distance from the result of the case; then values below the band are inside too.
+
+    ``error``: the error of the surrogate at runs that were excluded from its fit, as a fraction of the variance; NaN without a
+    surrogate. ``by``: the source of the percentiles, ``"process"`` (a Gaussian process) or ``"runs"``. ``refused``: the reason why
+    there is no band. ``first`` and ``total``: by the key of a parameter, the fraction of the variance over all frames that is due
+    to it, alone and together with others; empty if the surrogate is not accurate enough, with the reason in ``unreliable``.
     """
 
     quantity: str
@@ -95,20 +99,22 @@ class Band:
 
     @property
     def width(self) -> float:
-        """The maximum width over the frames, NaN without a band."""
+        """The maximum width of the band over the frames, NaN without a band."""
         widths = self.high - (0.0 if self.distance else self.low)
         return float(np.nanmax(widths)) if np.isfinite(widths).any() else math.nan
 
     @property
     def greatest_bar(self) -> float:
-        """The maximum error bar over the frames, NaN without a bar."""
+        """The maximum error bar over the frames, NaN without bars."""
         known = self.bar is not None and np.isfinite(self.bar).any()
         return float(np.nanmax(self.bar)) if known else math.nan  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A candidate in a band: by frame, its ``values``, its ``places`` (empty without a band), its distance ``beyond``."""
+    """A candidate compared with a band: in each frame its value (``values``), its verdict (``places``, empty where there is no
+    band) and its distance ``beyond`` the band.
+    """
 
     candidate: str
     quantity: str
@@ -118,28 +124,31 @@ class Placed:
 
     @property
     def word(self) -> str:
-        """The worst of :attr:`places`; empty if there is none."""
+        """The worst verdict of :attr:`places`; empty if there is none."""
         found = set(self.places)
         return next((word for word in ("no answer", "outside", "undecided", "inside") if word in found), "")
 
     @property
     def share(self) -> float:
-        """The fraction of the frames in which the candidate is inside; NaN if no frame counts."""
+        """The fraction of the frames with a band in which the candidate is inside the band; NaN if no frame has a band."""
         counted = [one for one in self.places if one]
         return counted.count("inside") / len(counted) if counted else math.nan
 
     @property
     def worst(self) -> float:
-        """The maximum distance beyond the band over the frames with an answer, 0 inside it; NaN without such frames."""
+        """The maximum distance beyond the band over the frames with an answer, 0 inside the band; NaN without such frames."""
         counted = [far for far, one in zip(self.beyond, self.places, strict=True) if one not in ("", "no answer")]
         return float(max(counted, default=math.nan))
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """The bands of a case from a number of ``runs`` of a design with a ``seed``, some of them ``failures``; ``fixed``: titles of
-    the numbers that were not varied; ``size`` [mm] of the tetrahedra; ``lost``: the reasons why candidates have no run;
-    ``seconds``: mean processor time of a run; ``refused``: the reason if the case itself has no solution, else empty.
+    """The ``bands`` of a case, from a design of ``runs`` with a ``seed``.
+
+    ``size`` [mm]: the size of the tetrahedra. ``fixed``: the titles of the parameters that were not varied. ``failures``: the runs
+    without a result. ``placed``: the candidates compared with the bands. ``lost``: the reasons why candidates have no run.
+    ``seconds``: the mean processor time of a run. ``origin``: the provenance. ``refused``: the reason if the case itself has no
+    solution, otherwise empty.
     """
 
     case: str
@@ -159,8 +168,10 @@ class Uncertainty:
 
 
 def place(candidate: str, band: Band, values: Floats) -> Placed:
-    """A candidate's ``values`` (f,) compared with a band: inside or outside by more than the error bar of the reference, else
-    undecided; also undecided without a bar. A value that is not finite has "no answer".
+    """Compare the ``values`` (f,) of a candidate with a band.
+
+    A value is inside or outside the band if its distance from the end of the band exceeds the error bar of the reference, otherwise
+    undecided. Without a bar it is undecided too. A value that is not finite has "no answer".
     """
     bar = np.full(len(values), math.nan) if band.bar is None else band.bar
     above, below = band.high - values, math.inf if band.distance else values - band.low
@@ -177,7 +188,7 @@ def place(candidate: str, band: Band, values: Floats) -> Placed:
 
 
 def _place(margin: float, bar: float) -> Place:
-    """The place of a value by its distance inside a band (``margin``), negative outside.
+    """The verdict on a value from its distance inside a band (``margin``), which is negative outside the band.
 
     >>> _place(0.5, 0.2), _place(0.1, 0.2), _place(-0.3, 0.2), _place(-0.1, math.nan), _place(math.nan, 0.2)
     ('inside', 'undecided', 'outside', 'undecided', 'no answer')

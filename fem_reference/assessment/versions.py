@@ -1,4 +1,4 @@
-"""Two versions of one solver: the statistics that moved nearer to the reference or farther away, and their frames."""
+"""Two versions of a solver: the statistics that have come nearer to the reference or gone farther away, with their frames."""
 
 import math
 from collections.abc import Iterator
@@ -20,8 +20,8 @@ ORDER: tuple[Word, ...] = ("worse", "mixed", "better", "within the error bar", "
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """The distances of a statistic from the reference, earlier (``was``) and ``now`` (f,), in ``unit``, at frame ``numbers``;
-    ``bars`` (f,): the error bars of the reference, NaN if unknown.
+    """The earlier and the current distance of the statistic ``name`` from the reference (``was`` and ``now`` (f,)), in ``unit``, at
+    frame ``numbers``. ``bars`` (f,): the error bars of the reference, NaN if unknown.
     """
 
     name: str
@@ -33,25 +33,25 @@ class Change:
 
     @property
     def further(self) -> Floats:
-        """The increase of the distance (f,), negative if it fell; infinite if only one of the values is a number."""
+        """The increase (f,) of the distance, negative if it decreased; infinite if only one of the two values is a number."""
         lost, found = np.isnan(self.now) & ~np.isnan(self.was), np.isnan(self.was) & ~np.isnan(self.now)
         further = np.abs(self.now) - np.abs(self.was)
         return np.where(lost, np.inf, np.where(found, -np.inf, further))
 
     @property
     def at(self) -> int:
-        """The index of the frame with the largest change, if possible among changes that exceed their error bar."""
+        """The index of the frame with the largest change; changes that exceed their error bar take precedence."""
         change = self._counted if self._counted.any() else self.further
         return int(np.argmax(np.nan_to_num(np.abs(change), nan=-1.0, posinf=np.inf)))
 
     @property
     def frame(self) -> int:
-        """The number of the frame :attr:`at`."""
+        """The number of the frame with index :attr:`at`."""
         return self.numbers[self.at]
 
     @property
     def by(self) -> float:
-        """The change in the frame :attr:`at`, positive if the distance grew; NaN without a number before or now."""
+        """The change in the frame :attr:`at`, positive if the distance increased; NaN without a number both earlier and now."""
         return float(self.further[self.at])
 
     @property
@@ -61,23 +61,23 @@ class Change:
 
     @property
     def greatest(self) -> tuple[float, float]:
-        """The maximum earlier distance from the reference and the maximum present one, NaN without a number."""
+        """The maximum distance from the reference earlier and the maximum distance now, NaN without a number."""
         return greatest(np.abs(self.was)), greatest(np.abs(self.now))
 
     @property
     def in_bars(self) -> float:
-        """The change in the frame :attr:`at`, in error bars; NaN if these are unknown."""
+        """The change in the frame :attr:`at` divided by the error bar; NaN if the bar is unknown."""
         return self.by / self.bar if self.bar > 0 else math.nan
 
     @property
     def size(self) -> float:
-        """The size by which changes are sorted: in error bars or, without bars, relative to the values before and now."""
+        """The number by which changes are sorted: the change in error bars or, without bars, relative to the maximum distance."""
         whole = np.nanmax([*self.greatest, 1e-300])
         return abs(self.by / whole) if math.isnan(self.in_bars) else abs(self.in_bars)
 
     @property
     def word(self) -> Word:
-        """The verdict on the change, neutral below rounding or the error bar; "mixed" if its sign differs between frames."""
+        """The verdict on the change: neutral below rounding or the error bar, "mixed" if its sign differs between frames."""
         if math.isnan(self.by):
             return "no number"
         if abs(self.by) <= 10.0 ** -PLACES[self.unit]:
@@ -89,7 +89,7 @@ class Change:
 
     @property
     def _counted(self) -> Floats:
-        """The changes (f,) that exceed rounding, their error bar and ``SHARE`` of the largest change; 0 for the others."""
+        """The changes (f,) that exceed rounding, their error bar, and ``SHARE`` of the largest change; 0 in all other frames."""
         change = np.nan_to_num(self.further, nan=0.0, posinf=np.inf, neginf=-np.inf)
         finite = np.abs(change[np.isfinite(change)])
         least = max(10.0 ** -PLACES[self.unit], SHARE * float(finite.max(initial=0.0)))
@@ -97,7 +97,7 @@ class Change:
 
     @property
     def other(self) -> int | None:
-        """For a mixed change, the index of the frame with the largest change of opposite sign; None for all others."""
+        """The index of the frame with the largest change of opposite sign; None unless the change is mixed."""
         if self.word != "mixed":
             return None
         return int(np.argmin(self._counted) if self.by > 0 else np.argmax(self._counted))
@@ -105,8 +105,11 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Versions:
-    """``current`` compared with an earlier state (``was``, in words): ``changes``, the worst first; the distance ``moved`` (f, k)
-    [mm] of each of ``vertices`` (k,); and the earlier positions (f, n, 3) [mm], None if only some vertices are known.
+    """The ``current`` measures compared with an earlier state, which ``was`` describes in words.
+
+    ``changes``: the changes of statistics, the worst first. ``moved`` (f, k) [mm]: the distance of each of the ``vertices`` (k,)
+    from its earlier position. ``before`` (f, n, 3) [mm]: the earlier positions, None if only those of some vertices are known.
+    ``differences``: the differences of provenance: key, earlier value and current value.
     """
 
     current: CurrentMeasures
@@ -127,7 +130,7 @@ class Versions:
 
     @property
     def place(self) -> tuple[int, int, float] | None:
-        """Frame index, vertex and distance [mm] of the largest motion; None without motion."""
+        """Frame index, vertex and distance [mm] of the largest motion; None if nothing moved."""
         known = np.nan_to_num(self.moved, nan=-1.0)
         i, k = np.unravel_index(int(np.argmax(known)), known.shape)
         if known[i, k] <= POSITION_ROUNDING:
@@ -136,7 +139,7 @@ class Versions:
 
 
 def of_runs(current: CurrentMeasures, before: CurrentMeasures, was: str) -> Versions:
-    """Compare the current measures with another run of the same frames."""
+    """Compare the current measures with those of another run over the same frames."""
     if current.points.shape != before.points.shape:
         got, want = (one.points.shape[1] for one in (before, current))
         raise InputError("--against", f"{got} vertices", f"{want}, as in the candidate")
@@ -150,7 +153,7 @@ def of_runs(current: CurrentMeasures, before: CurrentMeasures, was: str) -> Vers
 
 
 def of_baseline(current: CurrentMeasures, baseline: Baseline, was: str) -> Versions:
-    """Compare the current measures with the measures and sampled vertices of a baseline, which are rounded."""
+    """Compare the current measures with the rounded measures and positions of sampled vertices in a baseline."""
     names = {name: stored.unit for name, stored in baseline.measures.items()}
     known = {name: stored.numbers for name, stored in baseline.measures.items()}
     vertices, then = np.array(baseline.positions.vertices), baseline.positions.points(len(current.rest), "--against")
@@ -166,7 +169,7 @@ def _changes(current: CurrentMeasures, units: dict[str, str], was: dict[str, Flo
 
 
 def _differences(one: object, other: object, key: str = "") -> Iterator[tuple[str, str, str]]:
-    """The differences of two nested tables: key, value in one, value in the other."""
+    """The differences between two nested tables: the key, the value in ``one`` and the value in ``other``."""
     if isinstance(one, dict) and isinstance(other, dict):
         for name in dict.fromkeys([*one, *other]):
             yield from _differences(one.get(name), other.get(name), f"{key}.{name}".lstrip("."))

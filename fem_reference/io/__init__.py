@@ -1,1 +1,1 @@
-"""Reading and writing of files: meshes and texts, written completely or not at all."""
+"""Reading and writing of meshes and texts. Files are written completely or not at all."""

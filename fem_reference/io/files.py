@@ -1,6 +1,6 @@
-"""Reading and writing of surfaces, polylines and tetrahedra in common mesh formats; files are written completely or not at all.
+"""Reading and writing of surfaces, polylines and tetrahedra in common mesh formats. Files are written completely or not at all.
 
-A reader keeps the order and the number of the points and, if the file has it, their double precision.
+A reader keeps the order and the number of the points and, if the file has double precision, their precision.
 """
 
 import csv
@@ -23,21 +23,22 @@ from fem_reference.io.formats import Format, formats, vtk
 from fem_reference.io.formats.msh import read_mesh
 from fem_reference.io.texts import beside, check_size, is_file, parsed_xml
 
-# The maximum size in bytes of a mesh, a table or an index: a million triangles, more than our meshers and solvers can use. The
-# values of a text file need up to thirty times as much memory as the file.
+# The maximum size in bytes of a mesh, a table or an index: a million triangles, which is more than our meshers and solvers can use.
+# The values of a text file need up to thirty times as much memory as the file.
 MOST_BYTES = 2**26
-# A half-written file older than this [s] is removed unless its process runs here; a newer file may be written by another machine.
+# A half-written file that is older than this [s] is removed unless the process that writes it is running here. A newer file may be
+# in use by a process on another machine.
 _SETTLED = 10.0
 
 
 def shares_points(place: str) -> bool:
-    """True if triangles read from ``place`` share points, in the order of the file; False if each has its own three points."""
+    """True if triangles read from ``place`` share points, in the order of the file; False if each has three points of its own."""
     found = formats().get(Path(place).suffix.lower())
     return found is None or found.shares_points
 
 
 def _format(path: Path, want: str, known: Collection[str]) -> Format:
-    """The format of a file by its suffix, one of ``known``; InputError with ``want`` for any other."""
+    """The format of a file by its suffix. Raises InputError with ``want`` if the suffix is not one of ``known``."""
     suffix = path.suffix.lower()
     if suffix not in known:
         raise InputError(path, f'the suffix "{path.suffix}"', want)
@@ -45,10 +46,11 @@ def _format(path: Path, want: str, known: Collection[str]) -> Format:
 
 
 def read_surface(path: Path, unit: float) -> Surface:
-    """The triangles of a file whose coordinates are in units of ``unit`` mm; its ``place`` is the path.
+    """The triangles in a file, with the path as the ``place`` of the surface. ``unit``: the unit of the coordinates in the file, in
+    mm.
 
-    An STL file has no shared points: its surface has three points for each triangle. InputError if the file cannot be read
-    completely or has polygons other than triangles.
+    A surface from an STL file has three points for each triangle, because the file has no shared points. Raises InputError if the
+    file cannot be read completely, or has polygons other than triangles.
     """
     want = f"a complete triangle surface as {' '.join(formats())}"
     read = _format(path, want, formats()).read
@@ -57,8 +59,10 @@ def read_surface(path: Path, unit: float) -> Surface:
 
 
 def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) -> Surface:
-    """The boundary of the tetrahedra of a VTU or MSH file that have one of ``labels`` in an ``array`` of the cells (for gmsh
-    ``gmsh:physical``); coordinates are in units of ``unit`` mm. InputError if the file lacks the array or all labels.
+    """The boundary of those tetrahedra in a VTU or MSH file whose value in an ``array`` of the cells is one of ``labels``.
+
+    For gmsh the array is ``gmsh:physical``. ``unit``: the unit of the coordinates in the file, in mm. Raises InputError if the file
+    lacks the array, or has none of the labels.
     """
     want = (
         f'tetrahedra with an array "{array}" of integers, some of them {", ".join(map(str, labels))}, as .vtu or .msh'
@@ -83,9 +87,10 @@ def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) 
 
 
 def read_polylines(path: Path, unit: float, *, moved: bool = False) -> Polylines:
-    """The lines of a VTK or VTP file in units of ``unit`` mm; cells that begin at the end of another cell are joined to it.
-    InputError if the file cannot be read completely. ``moved``: True for lines of a moved state; in a state at rest, a point that
-    is not finite or a line without length is an error too.
+    """The lines in a VTK or VTP file. Cells that begin at the end of another cell are joined to it.
+
+    ``unit``: the unit of the coordinates in the file, in mm. ``moved``: True for lines of a moved state. In a state at rest, points
+    that are not finite and lines without length are errors too. Raises InputError if the file cannot be read completely.
     """
     want = f"complete polylines as {' or '.join(vtk.LINES)}"
     _format(path, want, vtk.LINES)
@@ -95,14 +100,13 @@ def read_polylines(path: Path, unit: float, *, moved: bool = False) -> Polylines
 
 
 def read_points(path: Path) -> Floats:
-    """The points (n, 3) of a VTK file with cells of any kind."""
+    """The points (n, 3) in a VTK file with cells of any kind."""
     return np.asarray(_attempt(vtk.data_set, path, "a complete VTK file").points, float)
 
 
 def read_xdmf(path: Path, unit: float) -> list[tuple[float, Surface]]:
-    """Time and surface of each step of a temporal collection, in units of ``unit`` mm.
-
-    The points are moved by the point data named ``displacement`` or ``u``.
+    """The time and the surface of each step of a temporal collection. ``unit``: the unit of the coordinates in the file, in mm. The
+    points are moved by the point data named ``displacement`` or ``u``.
     """
     want = "an XDMF time series of one triangle mesh with its displacement"
     steps = _attempt(xdmf.read, path, want)
@@ -110,7 +114,7 @@ def read_xdmf(path: Path, unit: float) -> list[tuple[float, Surface]]:
 
 
 def read_pvd(path: Path) -> list[tuple[float, Path]]:
-    """Time and file of each entry of a PVD index."""
+    """The time and the file of each entry in a PVD index."""
     want = "a PVD index with a timestep and a file for each DataSet"
 
     def read(index: Path) -> list[tuple[float, Path]]:
@@ -121,7 +125,7 @@ def read_pvd(path: Path) -> list[tuple[float, Path]]:
 
 
 def read_rows(path: Path) -> list[list[str]]:
-    """The rows of a comma-separated file with cells stripped, without empty lines and lines that begin with ``#``."""
+    """The rows of a comma-separated file, without empty lines and lines that begin with ``#``, and without spaces around cells."""
 
     def read(table: Path) -> list[list[str]]:
         lines = table.read_text(encoding="utf-8-sig").splitlines()
@@ -133,7 +137,7 @@ def read_rows(path: Path) -> list[list[str]]:
 
 
 def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
-    """Write a surface with its points at ``positions`` (n, 3) [mm], in VTK with point data ``displacement`` [mm], float64."""
+    """Write a surface with its points at ``positions`` (n, 3) [mm]; VTK files have float64 point data ``displacement`` [mm]."""
     written = [suffix for suffix, one in formats().items() if one.write]
     write = _format(path, f"one of {' '.join(written)}", written).write
     assert write is not None  # the suffix is one of the written formats
@@ -142,14 +146,14 @@ def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
 
 
 def write_polylines(path: Path, polylines: Polylines, positions: Floats) -> None:
-    """Write lines as VTP or VTK with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
+    """Write lines as VTP or VTK, with points at ``positions`` (n, 3) [mm] and float64 point data ``displacement`` [mm]."""
     _format(path, f"one of {' '.join(vtk.LINES)}", vtk.LINES)
     with whole(path) as part:
         vtk.save(part, positions, polylines, positions - polylines.points)
 
 
 def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
-    """Write tets as VTU with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
+    """Write tetrahedra as VTU, with points at ``positions`` (n, 3) [mm] and float64 point data ``displacement`` [mm]."""
     with whole(path) as part:
         vtk.save(part, positions, mesh.tets, positions - mesh.points)
 
@@ -157,7 +161,9 @@ def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
 def write_field(
     path: Path, points: Floats, cells: Ints, data: dict[str, Floats], cell_data: dict[str, Floats] | None = None
 ) -> None:
-    """Write ``cells`` (m, 2 to 4) between ``points`` (n, 1 to 3) as VTU or MSH, with arrays by name, (n, ...) or (m, ...)."""
+    """Write ``cells`` (m, 2 to 4) between ``points`` (n, 1 to 3) as VTU or MSH. ``data`` and ``cell_data``: arrays by name at the
+    points (n, ...) and on the cells (m, ...).
+    """
     import meshio
 
     space = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
@@ -168,14 +174,14 @@ def write_field(
 
 
 def write_pvd(path: Path, frames: Sequence[tuple[float, str]]) -> None:
-    """Write a PVD index: the time of each file (the number of a frame), and its path relative to the index."""
+    """Write a PVD index. ``frames``: for each file its time (the frame number) and its path relative to the index."""
     entries = "".join(f'<DataSet timestep="{time}" file={quoteattr(name)}/>\n' for time, name in frames)
     collection = f'<VTKFile type="Collection"><Collection>\n{entries}</Collection></VTKFile>\n'
     write_text(path, f'<?xml version="1.0"?>\n{collection}')
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write ``text`` in UTF-8; directly into ``path`` if this is a pipe or a device."""
+    """Write ``text`` in UTF-8. If ``path`` is a pipe or a device, the text is written directly into it."""
     if path.exists() and not path.is_file():
         try:
             path.write_text(text, encoding="utf-8")
@@ -188,7 +194,7 @@ def write_text(path: Path, text: str) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """A file to write to, which replaces ``path`` on success. An OSError names ``path`` and, on a full disk, the free space."""
+    """A temporary file, which replaces ``path`` on success. An OSError names ``path`` and, on a full disk, the free space."""
     part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
     clear(path)
     try:
@@ -202,7 +208,7 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def make_folder(path: Path) -> None:
-    """Create the folder ``path`` and its missing parent folders; an OSError names ``path`` and the reason."""
+    """Create the folder ``path`` and missing parent folders. An OSError names ``path`` and the reason."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -210,9 +216,9 @@ def make_folder(path: Path) -> None:
 
 
 def _unwritten(path: Path, error: OSError) -> OSError:
-    """The error for a ``path``, a file or a folder, that could not be written, with the reason as a sentence."""
+    """The error for a file or folder ``path`` that could not be written, with the reason as a sentence."""
     why = error.strerror or str(error)
-    if error.errno in (None, *NO_ROOM):  # numpy's errors have no number
+    if error.errno in (None, *NO_ROOM):  # errors of numpy have no number
         free = shutil.disk_usage(path.parent).free
         why += f"; {free / 2**20:.3g} MB are free there. Existing files are unchanged; finished work is kept and can be continued"
     found = OSError(f"{path}: cannot be written: {why}")
@@ -221,7 +227,7 @@ def _unwritten(path: Path, error: OSError) -> OSError:
 
 
 def clear(path: Path) -> None:
-    """Remove half-written copies of ``path``, a file or a folder, that killed processes have left."""
+    """Remove half-written copies of ``path``, a file or a folder, that killed processes have left behind."""
     for part in path.parent.glob(f".{glob.escape(path.stem)}-*{glob.escape(path.suffix)}"):
         process = part.name.removeprefix(f".{path.stem}-").removesuffix(path.suffix)
         with suppress(OSError):
@@ -230,7 +236,7 @@ def clear(path: Path) -> None:
 
 
 def _attempt[T](read: Callable[[Path], T], path: Path, want: str) -> T:
-    """The result of ``read`` for a file; any error due to a damaged file becomes an InputError."""
+    """The result of ``read`` for a file. Any error that a damaged file causes becomes an InputError."""
     if not is_file(path):
         raise InputError(path, "no file", want)
     check_size(path, MOST_BYTES, want)

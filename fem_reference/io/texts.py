@@ -1,4 +1,4 @@
-"""TOML, JSON and XML from untrusted files: bounded in size and depth, so that reading always ends.
+"""TOML, JSON and XML from untrusted files, with bounds on size and depth, so that reading always ends.
 
 A file is rejected if it cannot be parsed, is too large, is nested too deeply, or refers to files outside its folder.
 """
@@ -18,27 +18,28 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 
-# The maximum size of a file in bytes: a case file has some kB, a baseline 1.3 kB per frame. In memory it takes up to 30 times this.
+# The maximum size of a file in bytes. A case file has some kB, a baseline 1.3 kB per frame. In memory a file takes up to 30 times
+# its size.
 MOST_TOML = 2**21
 MOST_JSON = 2**25
 # The maximum number of levels of nested tables and lists; case files have up to 6.
 DEEPEST = 32
-# A mesh file may not define entities: they can multiply a text a billion times, or include other files.
+# A mesh file must not define entities, which can multiply a text a billion times or include other files.
 _FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")
-# Parts of a TOML text that are not keys: strings of all four kinds, and comments.
+# The parts of a TOML text that are not keys: strings of all four kinds, and comments.
 _NO_KEYS = re.compile(r'"""(?:\\.|[^\\])*?"""|\'\'\'.*?\'\'\'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*', re.DOTALL)
-# The time to read a dotted key grows with the square of the number of its parts.
+# The time to read a dotted key grows with the square of the number of its parts, so long keys are rejected.
 _LONG_KEY = re.compile(rf"(?<![\w-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++){{{DEEPEST},}}")
 
 
 def toml(path: Path) -> dict[str, Any]:
-    """The table of a TOML file."""
+    """The table in a TOML file."""
     want = "a TOML file"
     return parse_toml(_text(path, MOST_TOML, want), path, want)
 
 
 def parse_toml(text: str, place: object, want: str = "TOML") -> dict[str, Any]:
-    """The table of a TOML text; InputError at ``place``."""
+    """The table in a TOML ``text``. An InputError names the ``place``."""
     if (long := _LONG_KEY.search(_NO_KEYS.sub("_", text))) is not None:
         raise InputError(place, f'the key "{long[0]}"', f"{want} with keys of at most {DEEPEST} parts")
     table: dict[str, Any] = _parsed(tomllib.loads, text, place, want)
@@ -46,7 +47,7 @@ def parse_toml(text: str, place: object, want: str = "TOML") -> dict[str, Any]:
 
 
 def toml_text(text: str) -> str:
-    r"""``text`` as a basic string of TOML: JSON's escapes are valid in it, and the character DEL must be escaped too.
+    r"""The ``text`` as a basic string of TOML: the escapes of JSON are valid in it, but the character DEL must be escaped too.
 
     >>> print(toml_text('a "b"'))
     "a \"b\""
@@ -55,12 +56,12 @@ def toml_text(text: str) -> str:
 
 
 def read_json(path: Path, want: str) -> Any:
-    """The value of a JSON file; InputError with ``want`` for any other file, and for a file with NaN or Infinity."""
+    """The value in a JSON file. Raises InputError with ``want`` for any other file, and for a file with NaN or Infinity."""
     return _parsed(partial(json.loads, parse_constant=_no_number), _text(path, MOST_JSON, want), path, want)
 
 
 def parsed_xml(path: Path) -> ElementTree.Element:
-    """The root of an XML file; ValueError if it defines entities."""
+    """The root of an XML file. Raises ValueError if the file defines entities."""
     text = path.read_bytes()
     check_no_entities(text)
     return ElementTree.fromstring(text)
@@ -73,7 +74,7 @@ def check_no_entities(text: bytes) -> None:
 
 
 def beside(path: Path, name: str) -> Path:
-    """The file ``name`` to which the file at ``path`` refers; ValueError if it is outside that file's folder."""
+    """The file ``name`` to which the file at ``path`` refers. Raises ValueError if it is outside the folder of that file."""
     found = path.parent / name
     if not found.resolve().is_relative_to(path.parent.resolve()):
         raise ValueError(f'a reference to "{name}", outside the folder of the file')
@@ -81,7 +82,7 @@ def beside(path: Path, name: str) -> Path:
 
 
 def finite(value: float) -> float | None:
-    """``value`` for JSON: None if it is not finite.
+    """The ``value`` for JSON: None if it is not finite.
 
     >>> finite(2), finite(float("nan"))
     (2.0, None)
@@ -90,7 +91,8 @@ def finite(value: float) -> float | None:
 
 
 def plain(value: Any) -> Any:
-    """``value`` as valid JSON: records as tables, arrays and tuples as lists, and a number that is not finite as None.
+    """The ``value`` as valid JSON: records become tables, arrays and tuples become lists, and numbers that are not finite become
+    None.
 
     >>> plain({"error": float("nan"), "sizes": (2.0, 1)})
     {'error': None, 'sizes': [2.0, 1]}
@@ -105,7 +107,7 @@ def plain(value: Any) -> Any:
 
 
 def is_file(path: Path) -> bool:
-    """True if the path is a file; False also if its name is too long for a file."""
+    """True if the path is a file. False, without an error, if its name is too long for a file."""
     try:
         return path.is_file()
     except OSError:
@@ -123,7 +125,7 @@ def _text(path: Path, most: int, want: str) -> str:
         raise InputError(path, "no file", want)
     try:
         check_size(path, most, want)
-        return path.read_text(encoding="utf-8-sig")  # some editors write a byte order mark
+        return path.read_text(encoding="utf-8-sig")  # some editors begin a file with a byte order mark
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(path, str(error), want) from error
 
@@ -133,7 +135,7 @@ def _no_number(name: str) -> float:
 
 
 def _parsed(loads: Callable[[str], Any], text: str, place: object, want: str) -> Any:
-    """The value that ``loads`` reads from a text; InputError if it fails, or if the value is nested too deeply."""
+    """The value that ``loads`` reads from a ``text``. Raises InputError if reading fails, or if the value is nested too deeply."""
     try:
         value = loads(text)
         level = [value]

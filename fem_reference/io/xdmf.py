@@ -1,4 +1,4 @@
-"""Time series in XDMF, read with meshio, with their numbers in the file itself or in HDF5 files next to it."""
+"""Time series in XDMF, read with meshio. Their data are in the file itself or in HDF5 files in the same folder."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -16,7 +16,7 @@ _MOST = 3 * 10**7
 
 
 def read(path: Path) -> list[tuple[float, Floats, Ints]]:
-    """Time, positions of the points, and triangles of each step."""
+    """The time, the positions of the points, and the triangles of each step."""
     import meshio
 
     for item in parsed_xml(path).iter("DataItem"):
@@ -28,7 +28,7 @@ def read(path: Path) -> list[tuple[float, Floats, Ints]]:
 
 
 def _displacement(data: dict[str, Any], points: Floats) -> Any:
-    """The displacement in the point ``data`` of a step; ValueError unless it has the shape of ``points``."""
+    """The displacement in the point ``data`` of a step. Raises ValueError unless there is one with the shape of ``points``."""
     name = next((name for name in ("displacement", "u") if np.shape(data.get(name, 0)) == points.shape), None)
     if name is None:
         raise ValueError(f"point data {', '.join(data) or '(none)'} in a step")
@@ -36,7 +36,7 @@ def _displacement(data: dict[str, Any], points: Floats) -> Any:
 
 
 def _check(item: Element, path: Path) -> None:
-    """Raise ValueError if numbers are not in the file at ``path`` or in HDF5 files next to it, or are too many."""
+    """Raise ValueError if the data of an ``item`` are neither in the file at ``path`` nor in an HDF5 file in its folder."""
     if item.get("Format") == "XML":
         return
     if item.get("Format") != "HDF":
@@ -51,7 +51,7 @@ def _check(item: Element, path: Path) -> None:
 
 
 def _check_dataset(file: Any, place: str) -> None:
-    """Raise ValueError if the dataset at a ``place`` in an HDF5 file is stored outside this file, or is too large."""
+    """Raise ValueError if the dataset at ``place`` in an HDF5 file is not numeric, is stored outside this file, or is too large."""
     import h5py
 
     names = ["", *place.strip("/").split("/")]

@@ -1,8 +1,8 @@
 """Metrics: one file each, named as in scene files and JSON. A metric does not know the solver of a run.
 
-Contract (tests/contracts/test_every_metric.py): a run against itself gives zero, a known change gives a known value, NaN stays
-NaN, and units are stated. Each metric describes its ``STATISTICS`` and states the part of a run that it measures (``OF``: surface,
-lines or field) and its standard (``AGAINST``): the reference (or the rest state), the exact solution, or the run itself.
+Contract (tests/contracts/test_every_metric.py): a run against itself gives zero, a known change gives a known value, NaN stays NaN,
+and units are stated. Each metric describes its ``STATISTICS``. It states the part of a run that it measures (``OF``: surface, lines
+or field) and its standard (``AGAINST``): the reference (or the rest state), the exact solution, or the run itself.
 """
 
 import importlib
@@ -35,10 +35,11 @@ class Statistic:
     """The description of a statistic by its metric.
 
     ``title`` and ``part``: headings of the group of columns and of the column. ``headline``: a sentence with ``{}`` for the value.
-    ``curve``: the title of the plot of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: its position in the
-    order at each place, the lowest first. ``local``: True if its error converges like that of the worst point.
-    ``lone``: True for the value of a single fibre or of the force on a bone, which is not a mean. ``pooled``: True if statistics of
-    its metric belong to one field in one unit; the rms of all then replaces a difference that is small by chance.
+    ``curve``: the title of the plot of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: by place, the rank
+    of the statistic in the order there, the lowest first. ``local``: True if its error converges like that of the worst point.
+    ``lone``: True for the value of a single fibre or of the force on a bone, which is not a mean. ``pooled``: True if the
+    statistics of its metric belong to one field in one unit. A difference that is small by chance is then replaced by the rms of
+    the differences of all these statistics.
     """
 
     unit: str
@@ -66,7 +67,7 @@ class Statistic:
 @dataclass(frozen=True, eq=False)
 class Measure:
     """One statistic of one metric: ``values`` (f,) in ``unit`` at frame ``numbers`` (f,), which count from 0 if not given.
-    ``where`` (f,): the worst point at each frame, in words. ``error_bars`` (f,): bars of the reference, None if it has none.
+    ``where`` (f,): the worst point in each frame, in words. ``error_bars`` (f,): the bars of the reference, None if it has none.
     """
 
     metric: str
@@ -79,12 +80,12 @@ class Measure:
 
     @property
     def worst(self) -> "Worst":
-        """The frame with the greatest magnitude; NaN counts as the greatest."""
+        """The frame with the largest magnitude; NaN counts as the largest."""
         return self._at(np.where(np.isnan(self.values), np.inf, np.abs(self.values)))
 
     @property
     def worst_number(self) -> "Worst | None":
-        """The worst frame among those with a finite value, None if there are none."""
+        """The frame with the largest magnitude among those with a finite value, None if there are none."""
         known = np.isfinite(self.values)
         return self._at(np.where(known, np.abs(self.values), -1.0)) if known.any() else None
 
@@ -102,8 +103,8 @@ class Measure:
 
 @dataclass(frozen=True)
 class Worst:
-    """A measure in its worst ``frame`` (a number, at ``index``). ``value`` and ``error_bar``, the bar of the reference (None if
-    it has none), are in ``unit``; ``where`` is its position in words.
+    """A measure in its worst frame: the number of the ``frame`` and its ``index``, the ``value`` and the ``error_bar`` of the
+    reference (None if it has none) in ``unit``, and the position in words (``where``).
     """
 
     value: float
@@ -116,10 +117,10 @@ class Worst:
 
 @dataclass(frozen=True, eq=False)
 class MeasurementContext:
-    """The common context of all measurements of a case. ``areas`` (n,) [mm2]: areas around the surface's vertices at rest.
-    ``fibres``: the fibres at rest. ``extension``: carries a surface's displacement to the fibres' points. ``travel`` [mm]: the
-    greatest displacement of the reference's surface over its frames. ``bones``; ``exempt``: the part exempt from their contact;
-    ``joints``; ``ends``: the ends of the fibres, None without attachments.
+    """The data that all measurements of a case share. ``areas`` (n,) [mm2]: the area around each vertex of the surface at rest.
+    ``fibres``: the fibres at rest. ``extension``: carries the displacement of a surface to the points of the fibres. ``travel``
+    [mm]: the maximum displacement of the reference's surface over all frames. ``bones``: the bones. ``exempt``: the part of the
+    surface that is exempt from contact. ``joints``: the joints. ``ends``: the ends of the fibres, None without attachments.
     """
 
     areas: Floats
@@ -140,7 +141,7 @@ class MeasurementContext:
         exempt: Exemption | None = None,
         joints: tuple[Joint, ...] = (),
     ) -> "MeasurementContext":
-        """The measurement context of a reference run; nothing is exempt by default."""
+        """The measurement context for a ``reference`` run; by default nothing is exempt from contact."""
         rest = reference.surface
         return cls(
             areas=vertex_areas(rest.points, rest.triangles),
@@ -155,7 +156,7 @@ class MeasurementContext:
 
 @dataclass(frozen=True)
 class FieldContext:
-    """The context of all measurements of a scalar case: the formula of the ``exact`` solution, None if it is not known."""
+    """The data that all measurements of a scalar case share: the formula of the ``exact`` solution, None if it is not known."""
 
     exact: str | None
 
@@ -168,7 +169,7 @@ def context_of(setup: Setup, reference: Run) -> MeasurementContext: ...
 @overload
 def context_of(setup: CaseSetup, reference: Run) -> Context: ...
 def context_of(setup: CaseSetup, reference: Run) -> Context:
-    """The :data:`Context` of a case's runs; InputError if the ``reference`` of a muscle lacks its surface or its fibres."""
+    """The :data:`Context` for runs of a case; InputError if the ``reference`` of a muscle lacks its surface or its fibres."""
     if "field" in reference.carries:
         return FieldContext(setup.exact)
     if not reference.has_surface:
@@ -189,7 +190,7 @@ class Metric(Protocol):
     AGAINST: Standard
 
     def measure(self, run: Run, reference: Run, context: Any, /) -> tuple[Measure, ...]:
-        """Every statistic of ``run`` against ``reference``, frame by frame."""
+        """All statistics of ``run`` against ``reference``, frame by frame."""
 
 
 def metric(name: str) -> Metric:
@@ -204,7 +205,7 @@ def names(against: Collection[Standard] | None = None) -> list[str]:
 
 @cache
 def described(where: Shown | None = None) -> dict[tuple[str, str], Statistic]:
-    """The statistics by metric and name: all, or only the statistics shown at one place, in the order of that place."""
+    """The statistics by metric and name: all, or those shown at one place (``where``), in the order of that place."""
     found = {(name, one): each for name in names() for one, each in metric(name).STATISTICS.items()}
     if where is None:
         return found
@@ -229,8 +230,8 @@ def of_itself(name: str) -> bool:
 
 
 def measure(run: Run, reference: Run, context: Context, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
-    """Every statistic of every metric (or of those ``wanted``) of ``run`` against ``reference``, frame by frame; both must have
-    the same frames. Metrics of a part that the run does not carry are left out.
+    """All statistics of all metrics (or of the metrics ``wanted``) of ``run`` against ``reference``, frame by frame. Both runs must
+    have the same frames. Metrics of a part that the run does not carry are left out.
     """
     chosen = map(metric, names() if wanted is None else wanted)
     return tuple(
@@ -242,7 +243,7 @@ def measure(run: Run, reference: Run, context: Context, wanted: Iterable[str] | 
 
 
 def measures(name: str, values: Mapping[str, Floats], where: Collection[str] = ()) -> tuple[Measure, ...]:
-    """The measures of the metric ``name`` from ``values`` (f,) by statistic; ``where`` (f,): the worst points of all, if known."""
+    """The measures of the metric ``name``. ``values`` (f,): its values by statistic; ``where`` (f,): the worst points, if known."""
     stated = metric(name).STATISTICS
     return tuple(
         Measure(name, one, stated[one].unit, each, tuple(where) or ("",) * len(each)) for one, each in values.items()
@@ -255,7 +256,7 @@ def find(measures: Iterable[Measure], metric: str, statistic: str) -> Measure | 
 
 
 def at_rest(run: Run) -> Run:
-    """The rest state of ``run`` and its fibres, repeated over its frames: the standard for its change from rest."""
+    """The rest state of ``run`` and of its fibres, repeated over its frames: the standard for its change from rest."""
     frames = len(run.numbers)
     still = np.broadcast_to(run.surface.points, (frames, *run.surface.points.shape))
     fibres = None if run.fibres is None else np.broadcast_to(run.fibres.points, (frames, *run.fibres.points.shape))
@@ -264,31 +265,32 @@ def at_rest(run: Run) -> Run:
 
 
 def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
-    """Every statistic of the change from rest of a ``run`` of the reference's solver, on the fibres of this run. If overlaps with
-    bones are removed first, the fibres of two runs differ at rest, and the surface would have to carry the fibres of another run.
+    """All statistics of the change from rest of a ``run`` by the reference's solver, measured on the fibres of this run: if
+    overlaps with bones are removed first, the fibres of two runs differ at rest, and a surface would have to carry the fibres of
+    another run.
     """
     own = context if run.fibres is None else replace(context, fibres=run.fibres)
     return measure(run, at_rest(run), own, wanted)
 
 
 def as_surface(run: Run) -> Run:
-    """The run without an interior: its surface carries the measured fibres, as for a candidate."""
+    """The ``run`` without its interior, so that its surface carries the measured fibres, as for a candidate."""
     return replace(run, fibres=None, fibre_positions=None)
 
 
 def at_vertices(run: Run, vertices: Ints) -> tuple[str, ...]:
-    """The ``vertices`` (f,) of the mesh of a field and their positions, in words."""
+    """The numbers of the ``vertices`` (f,) of a field's mesh and their positions, in words."""
     places = (", ".join(f"{x:.4g}" for x in run.points[vertex]) for vertex in vertices)
     return tuple(f"vertex {vertex} at ({place})" for vertex, place in zip(vertices, places, strict=True))
 
 
 def rms(deviations: Floats, weights: Floats) -> Floats:
-    """Root of the weighted mean square of each row of ``deviations`` (f, n), (f,)."""
+    """The root (f,) of the weighted mean square of each row of ``deviations`` (f, n), with ``weights`` (n,)."""
     return np.asarray(np.sqrt(deviations**2 @ weights / weights.sum()))
 
 
 def percentile(values: Floats, weights: Floats, share: float) -> float:
-    """The smallest of ``values`` (n,) with at least the fraction ``share`` of the weight up to it; NaN if any is not finite."""
+    """The smallest of ``values`` (n,) up to which the weight is at least the fraction ``share``; NaN if any value is not finite."""
     if not np.isfinite(values).all():
         return float("nan")
     order = np.argsort(values)

@@ -1,4 +1,4 @@
-"""Difference between a field and the reference at the vertices, as a fraction of the reference's greatest magnitude."""
+"""Difference between a field and the reference at the vertices, as a fraction of the maximum magnitude of the reference."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ OF, AGAINST = "field", "reference"
 
 
 def measure(run: Run, reference: Run, _context: FieldContext) -> tuple[Measure, ...]:
-    """``max``, the greatest difference at a vertex divided by the reference's greatest magnitude; undivided if this is 0."""
+    """``max``: the maximum difference at a vertex divided by the maximum magnitude of the reference; not divided if this is 0."""
     size = np.abs(reference.vertex_values).max(axis=1)
     apart = np.abs(run.vertex_values - reference.vertex_values)
     values = apart.max(axis=1) / np.where(size > 0, size, 1.0)

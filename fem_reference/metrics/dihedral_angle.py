@@ -1,6 +1,6 @@
 """Dihedral angles at the edges of a run's surface, compared with the reference.
 
-Against rest, the mean magnitude is the dihedral angle change of the report (eq. 5.23, Figs 6.18 to 6.20).
+Relative to rest, the mean magnitude is the dihedral angle change of the report (eq. 5.23, Figs 6.18 to 6.20).
 """
 
 import numpy as np
@@ -24,11 +24,12 @@ OF, AGAINST = "surface", "reference"
 
 
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """Statistics over the edges of the angle minus the reference's angle [deg], in (-180, 180]: the signed ``mean`` (above zero:
-    more convex) and the ``rms``; for the magnitude the mean (``mean_magnitude``), 95th percentile (``p95``) and greatest (``max``).
+    """Statistics over the edges of the angle minus the angle in the reference [deg], in (-180, 180].
 
-    An edge is weighted by the area around it at rest, a third of its two triangles. In ``mean_magnitude_of_edges`` all edges have
-    the same weight, as in the report. NaN in a frame where a triangle has collapsed: it has no angle.
+    ``mean``: the signed mean, positive if edges are more convex. ``rms``: the root mean square. ``mean_magnitude``, ``p95`` and
+    ``max``: the mean, the 95th percentile and the maximum of the magnitude. An edge is weighted by the area around it at rest,
+    which is a third of its two triangles. In ``mean_magnitude_of_edges`` all edges have the same weight, as in the report. NaN in
+    frames in which a triangle has collapsed, because there is no angle then.
     """
     edges = Edges.of(reference.surface)
     angles, wanted = (np.array([edges.angles(points) for points in each.positions]) for each in (run, reference))
@@ -40,7 +41,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
 
 def wrapped(angles: Floats) -> Floats:
-    """Differences of two angles, in (-2 pi, 2 pi), mapped to (-pi, pi]; values already in this range do not change at all.
+    """Differences of two angles, in (-2 pi, 2 pi), mapped to (-pi, pi]. Values that are already in this range do not change at all.
 
     >>> np.degrees(wrapped(np.radians([20.0, 340.0, -340.0]))).round(9).tolist()
     [20.0, -20.0, 20.0]

@@ -1,5 +1,7 @@
-"""Energy stored in a muscle by all its effects, but not in attachment springs or contact; only some solvers compute it. Apart from
-these and dissipation, its change is the work of the bones, and its derivative with respect to a joint angle is minus the moment.
+"""Energy stored in a muscle by all its effects, but not in attachment springs or contact; only some solvers compute it.
+
+Apart from springs, contact and dissipation, the change of energy is the work of the bones, and its derivative with respect to a
+joint angle is minus the moment.
 """
 
 from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
@@ -14,7 +16,7 @@ OF, AGAINST = "surface", "reference"
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:  # noqa: ARG001
-    """The difference ``stored`` [N mm] from the energy of the reference; against rest, the energy itself."""
+    """``stored`` [N mm]: the energy minus the energy of the reference; relative to rest, the energy itself."""
     own, other = (one.scalars.get("energy") for one in (run, reference))
     if own is None or (other is None and reference.solver != "rest"):
         return ()

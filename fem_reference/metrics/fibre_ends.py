@@ -1,7 +1,9 @@
-"""Distances of the ends of fibres from their positions on moving bones, in the run alone, independent of the reference. An end of
-a fibre at an attachment moves with its bone. Fibres from a file may end beside the attached area: such fibres do not follow the
-bone, and differ in length and moment arm from fibres that reach it. A run without fibres is measured on points that its surface
-carries. :func:`fem_reference.problems.fibre_ends.attached_ends` gives the attachment of an end.
+"""Distances of the ends of fibres from their positions on moving bones, in the run alone, independent of the reference.
+
+The end of a fibre at an attachment moves with its bone. A fibre from a file may end near the attached area without reaching it.
+Such a fibre does not follow the bone, and differs in length and moment arm from fibres that reach the area. In a run without
+fibres, points that its surface carries are measured. :func:`fem_reference.problems.fibre_ends.attached_ends` gives the attachment
+of an end.
 """
 
 import numpy as np
@@ -23,8 +25,9 @@ OF, AGAINST = "lines", "itself"
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """``mean`` and ``max`` over the ends of all fibres of ``|x(X) - x_bone(X)|`` [mm]: the position of an end minus its rest
-    position moved by the pose of its bone, even if a tendon continues to the bone. An unattached muscle has no such measures.
+    """``mean`` and ``max``: over the ends of all fibres, the mean and the maximum of ``|x(X) - x_bone(X)|`` [mm], the distance
+    between an end and the point to which its bone moves the end's rest position. A tendon between the end and the bone makes no
+    difference. A muscle without attachments has no such measures.
     """
     if context.ends is None:
         return ()

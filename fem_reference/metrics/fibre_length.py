@@ -1,8 +1,11 @@
-"""Lengths of the fibres of a run compared with the reference, frame by frame. If both runs carry the fibres of the measurement
-context in their interior, these fibres are measured. Otherwise the surfaces of both runs carry the fibres by the extension of the
-measurement context, so both are measured in the same way. The length of a fibre includes its straight tendon, if any. A run of
-lines only (a line of action) has points of its own. Its total length is compared, so a straight line that is shorter than the fibre
-deviates even at rest. This counts as an error, even if the change of length from rest is correct.
+"""Lengths of the fibres of a run compared with the reference, frame by frame.
+
+If both runs carry the fibres of the measurement context in their interior, these fibres are measured. Otherwise the surfaces of
+both runs carry the fibres, by the extension in the measurement context, so that both runs are measured in the same way. The length
+of a fibre includes its straight tendon, if it has one.
+
+A run of lines alone (lines of action) has its own fibre points. Its total length is compared, so a straight line that is shorter
+than the fibre deviates even at rest. This counts as an error, even if the change of length from rest is correct.
 """
 
 from functools import partial
@@ -15,7 +18,7 @@ from fem_reference.problems.fibre_ends import ends_of
 from fem_reference.runs.store import Run
 
 _TITLE = "Fibre length"
-# Fibres are few and end at rims, so one of them may contribute most of the mean square: all statistics count as local.
+# Fibres are few and end at rims, so a single fibre may contribute most of the mean square: all statistics count as local.
 _of_lines = partial(Statistic, local=True)
 STATISTICS = {
     "mean": _of_lines("mm", curve="Change of fibre length from rest, mean over the fibres", shown={"curve": 20}),
@@ -30,17 +33,16 @@ STATISTICS = {
     "max_percent": _of_lines("%", _TITLE, "worst fibre", shown={"table": 30, "claim": 60}, lone=True),
 }
 OF, AGAINST = "lines", "reference"
-# Fibre points within this distance [mm] of points of the measurement context count as the same points in single precision.
+# Fibre points within this distance [mm] of the points of the measurement context are the same points, stored in single precision.
 _SAME = 1e-3
-# The same distance for a run of lines alone: a reference begins up to this far from rest if overlaps with bones were removed.
+# The same distance for a run of lines alone: a reference may begin this far from rest if overlaps with bones were removed.
 _RELAXED = 5.0
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Statistics over the fibres of ``L - L_reference``: the signed ``mean``, the ``rms`` and the greatest magnitude ``max`` [mm].
-
-    ``mean_percent``, ``rms_percent`` and ``max_percent`` are the same in per cent of each fibre's length at rest.
+    """Statistics over the fibres of ``L - L_reference`` [mm]: the signed ``mean``, the ``rms`` and the maximum magnitude ``max``.
+    ``mean_percent``, ``rms_percent`` and ``max_percent``: the same in per cent of the length of each fibre at rest.
     """
     found, expected = both_lengths(run, reference, context)
     longer, at_rest = found - expected, lengths_at(context.fibres.points, run.numbers[0], context)
@@ -48,20 +50,20 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 
 
 def both_lengths(run: Run, reference: Run, context: MeasurementContext) -> tuple[Floats, Floats]:
-    """The lengths (f, k) [mm] of each fibre in each frame of both runs, measured in the same way."""
+    """The lengths (f, k) [mm] of the fibres in each frame of the ``run`` and of the ``reference``, measured in the same way."""
     inside = _carries(run, context) and _carries(reference, context)
     return _lengths(run, context, inside=inside), _lengths(reference, context, inside=inside)
 
 
 def _statistics(longer: Floats, suffix: str) -> tuple[Measure, ...]:
-    """Mean, rms and greatest magnitude over the fibres of ``longer`` (f, k), under these names and a ``suffix``."""
+    """The mean, rms and maximum magnitude over the fibres of ``longer`` (f, k); the ``suffix`` is added to these names."""
     rms = np.sqrt(np.mean(longer**2, axis=1))
     values = {"mean": longer.mean(axis=1), "rms": rms, "max": np.abs(longer).max(axis=1)}
     return measures("fibre_length", {f"{name}{suffix}": each for name, each in values.items()}, _worst(longer))
 
 
 def fibre_points(run: Run, context: MeasurementContext) -> Floats:
-    """Positions of the points of the fibres, (f, m, 3) [mm]: from the run itself, or carried by its surface."""
+    """Positions (f, m, 3) [mm] of the points of the fibres, from the run itself or carried by its surface."""
     own = run.fibre_positions
     if own is not None and own.shape[1:] == context.fibres.points.shape:
         return own
@@ -70,9 +72,11 @@ def fibre_points(run: Run, context: MeasurementContext) -> Floats:
 
 @np.errstate(over="ignore", invalid="ignore")
 def extension_error(reference: Run, context: MeasurementContext) -> Measure:
-    """The greatest error [mm], over the fibres, of lengths by the extension, measured on the reference's own surface.
+    """The maximum error [mm], over the fibres, of lengths computed by the extension, measured on the surface of the reference
+    itself.
 
-    The error is L by extension minus L inside; NaN if the reference does not carry the fibres of the measurement context.
+    The error is the length by the extension minus the length in the interior; NaN if the reference does not carry the fibres of the
+    measurement context.
     """
     if _carries(reference, context):
         errors = _lengths(reference, context, inside=False) - _lengths(reference, context, inside=True)
@@ -92,8 +96,8 @@ def _carries(run: Run, context: MeasurementContext) -> bool:
 
 
 def _lengths(run: Run, context: MeasurementContext, *, inside: bool) -> Floats:
-    """Length of each fibre in each frame (f, k) [mm], on the run's own fibre points ``inside``, or on points that its surface
-    carries. In the rest state the bones are at their first frame.
+    """The length (f, k) [mm] of each fibre in each frame, on the fibre points of the run itself if ``inside``, otherwise on points
+    that its surface carries. In the rest state the bones have their poses in the first frame.
     """
     points = run.fibre_positions if inside else [context.extension.apply(each) for each in run.positions]
     assert points is not None  # the caller has checked _carries
@@ -102,7 +106,7 @@ def _lengths(run: Run, context: MeasurementContext, *, inside: bool) -> Floats:
 
 
 def lengths_at(points: Floats, number: int, context: MeasurementContext) -> Floats:
-    """Length (k,) [mm] of each fibre with its tendons, its points at ``points`` (n, 3) [mm] at frame ``number``."""
+    """The length (k,) [mm] of each fibre including its tendons, if its points are at ``points`` (n, 3) [mm] in frame ``number``."""
     inside = context.fibres.lengths(points)
     return inside if context.ends is None else inside + context.ends.beyond(ends_of(context.fibres, points), number)
 

@@ -1,6 +1,6 @@
 """Fractions of a run's surface that are inside out or lie within another part of the body, compared with the reference.
 
-The fractions need only the surface, so every run has them. For a solver with an interior, the smallest det F is stricter.
+These fractions need only the surface, so every run has them. For a solver with an interior, the smallest det F is stricter.
 """
 
 from functools import lru_cache
@@ -17,10 +17,10 @@ OF, AGAINST = "surface", "reference"
 
 
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """Fractions of the surface, by its area at rest, minus those in the reference [%]. ``inside_out``: triangles whose outer side
-    faces a part of the body that is turned inside out; ``overlapping``: triangles inside another part of the body.
+    """Fractions of the surface, by its area at rest, minus the fractions in the reference [%].
 
-    NaN in a frame where a triangle has collapsed: it has no outer side.
+    ``inside_out``: triangles whose outer side faces a part of the body that is turned inside out. ``overlapping``: triangles inside
+    another part of the body. NaN in frames in which a triangle has collapsed, because it has no outer side then.
     """
     windings, wanted = _windings(run), _windings(reference)
     areas = triangle_areas(reference.surface.points, reference.surface.triangles)
@@ -34,7 +34,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
 @lru_cache(maxsize=4)  # a run is measured against many others, and this takes most of the time
 def _windings(run: Run) -> Floats:
-    """The outer windings (f, m) of the triangles in each frame, computed once for frames that share an array."""
+    """The outer windings (f, m) of the triangles in each frame; they are computed only once for frames that share an array."""
     still = run.positions.strides[0] == 0
     once = np.array([outer_windings(run.surface.moved_to(points)) for points in run.positions[: 1 if still else None]])
     found = np.broadcast_to(once, (len(run.positions), once.shape[1]))
@@ -43,13 +43,13 @@ def _windings(run: Run) -> Floats:
 
 
 def _share(windings: Floats, areas: Floats) -> Floats:
-    """For each frame of ``windings`` (f, m), the fraction (f,) [%] of ``areas`` (m,) where they are above 0."""
+    """The fraction (f,) [%] of the ``areas`` (m,) with positive ``windings`` (f, m) in each frame; NaN if a winding is NaN."""
     share = 100 * (windings > 0) @ areas / areas.sum()
     return np.where(np.isnan(windings).any(axis=1), np.nan, share)
 
 
 def _first(windings: Floats, run: Run) -> tuple[str, ...]:
-    """For each frame the triangle with the greatest of ``windings`` (f, m) and its position; empty if none is above 0."""
+    """The triangle with the largest of ``windings`` (f, m) in each frame and its position, in words; empty if none is positive."""
     found = np.argmax(windings, axis=1)
     middles = run.positions[np.arange(len(found))[:, None], run.surface.triangles[found]].mean(axis=1)
     return tuple(

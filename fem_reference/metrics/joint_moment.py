@@ -1,9 +1,11 @@
-"""Force of the muscle on the bone of the joint that turns, by attachments and contact, and its moment about the joint's axis. A
-moment is positive if it turns the bone to greater angles; its moment arm is the moment divided by the force. The axis is fixed in
-space. By virtual work, without dissipation, the moment is minus the derivative of the stored energy with respect to the angle.
-Lines of action pull at ends, via-points and obstacles. The force is unknown for lines without ``hill`` and most fast solvers.
+"""Force of the muscle on the bone of the rotating joint, by attachments and contact, and its moment about the axis of the joint.
 
-The moment arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with
+A moment is positive if it rotates the bone towards larger angles. The moment arm is the moment divided by the force. The axis is
+fixed in space. By virtual work, without dissipation, the moment is minus the derivative of the stored energy with respect to the
+angle. Lines of action pull at their ends, at via-points and at obstacles. The force is unknown for lines without ``hill`` and for
+most fast solvers.
+
+This moment arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with
 little force (docs/measures.md).
 """
 
@@ -35,11 +37,13 @@ STATISTICS = {
     ),
 }
 OF, AGAINST = "lines", "reference"
-_LEAST = 1e-6  # a force below this fraction of the greatest force is round-off and has no moment arm
+_LEAST = 1e-6  # a force below this fraction of the maximum force is round-off and has no moment arm
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Differences of ``moment`` [N mm], ``force`` [N], ``arm`` [mm]; NaN if no joint turns alone (the arm also without force)."""
+    """Differences of ``moment`` [N mm], ``force`` [N] and ``arm`` [mm] from the reference; NaN in frames in which no joint rotates
+    alone. Without force, the arm is NaN too.
+    """
     joints = [joint for joint in context.joints if _has_force(run, joint)]
     # The rest state of a run, which has no force, is the standard for its change from rest.
     if not joints or not (reference.solver == "rest" or all(_has_force(reference, joint) for joint in joints)):
@@ -56,10 +60,10 @@ def _has_force(run: Run, joint: Joint) -> bool:
 
 
 def _values(run: Run, joint: Joint) -> Floats:
-    """Moment, force and moment arm by frame (3, f).
+    """The moment, the force and the moment arm in each frame (3, f).
 
     For a muscle that is a line between two bones, or around obstacles on these bones, the arm is ``-dl/dtheta``. For any other
-    muscle it is, by virtual work, the mean of ``-dl/dtheta`` of all parts that pull, weighted by their shares of the resultant.
+    muscle it is, by virtual work, the mean of ``-dl/dtheta`` over all parts that pull, weighted by their shares of the resultant.
     """
     moment = run.moment(joint.bone.name, joint.centre) @ joint.axis
     force = np.linalg.norm(run.force(joint.bone.name), axis=1)

@@ -1,4 +1,4 @@
-"""The L2 norm of the error of a field over its domain, where the exact solution is known."""
+"""L2 norm of the error of a field over its domain, for cases with a known exact solution."""
 
 from functools import partial
 
@@ -14,7 +14,7 @@ OF, AGAINST = "field", "exact"
 
 
 def measure(run: Run, _reference: Run, context: FieldContext) -> tuple[Measure, ...]:
-    """``norm``, the root of the integral of the squared error; no measure if no exact solution is known."""
+    """``norm``: the root of the integral of the squared error; no measure if no exact solution is known."""
     if context.exact is None or run.mesh is None:
         return ()
     exact = partial(at, context.exact)

@@ -1,4 +1,4 @@
-"""The greatest value of a field at a vertex."""
+"""Maximum of a field over the vertices."""
 
 from fem_reference.metrics import FieldContext, Measure, Statistic, at_vertices, measures
 from fem_reference.runs.store import Run
@@ -8,7 +8,7 @@ OF, AGAINST = "field", "itself"
 
 
 def measure(run: Run, _reference: Run, _context: FieldContext) -> tuple[Measure, ...]:
-    """``value``, the greatest over the vertices; NaN if any value is NaN."""
+    """``value``: the maximum over the vertices; NaN if any value is NaN."""
     values = run.vertex_values
     where = at_vertices(run, values.argmax(axis=1))
     return measures("maximum", {"value": values.max(axis=1)}, where)

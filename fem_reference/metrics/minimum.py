@@ -1,4 +1,4 @@
-"""The least value of a field at a vertex."""
+"""Minimum of a field over the vertices."""
 
 from fem_reference.metrics import FieldContext, Measure, Statistic, at_vertices, measures
 from fem_reference.runs.store import Run
@@ -8,7 +8,7 @@ OF, AGAINST = "field", "itself"
 
 
 def measure(run: Run, _reference: Run, _context: FieldContext) -> tuple[Measure, ...]:
-    """``value``, the least over the vertices; NaN if any value is NaN."""
+    """``value``: the minimum over the vertices; NaN if any value is NaN."""
     values = run.vertex_values
     where = at_vertices(run, values.argmin(axis=1))
     return measures("minimum", {"value": values.min(axis=1)}, where)

@@ -1,9 +1,9 @@
 """Moment arms of the fibres about the rotating joint, by the tendon excursion method: ``-dl/dtheta`` (An et al. 1984).
 
-``l`` [mm] is the length of a fibre, ``theta`` [rad] the angle of the joint; the moment arm is positive if the muscle shortens as
-the angle grows, as in OpenSim. The slope is taken from the parabola through three frames; its error is of second order in their
-angles. A frame at which the joint is at rest takes the slope of the frames nearest in time. If more than one bone moves, lengths do
-not depend on one angle alone, and the arm is NaN. A case without a joint has no moment arms.
+``l`` [mm] is the length of a fibre and ``theta`` [rad] the angle of the joint. The moment arm is positive if the muscle shortens as
+the angle increases, as in OpenSim. The slope is that of the parabola through three frames; its error is of second order in their
+angles. A frame in which the joint is at rest takes the slope of the frames nearest in time. If more than one bone moves, lengths do
+not depend on a single angle, and the moment arm is NaN. A case without a joint has no moment arms.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,13 +27,15 @@ STATISTICS = {
     "greatest": Statistic("mm", _TITLE, "greatest over the fibres", local=True, lone=True),
 }
 OF, AGAINST = "lines", "reference"
-# Angles [rad], and entries of pose matrices, count as equal if they differ by no more than this.
+# Angles [rad], and the entries of pose matrices, count as equal if they differ by at most this.
 _SAME = 1e-9
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """``mean``, ``least``, ``greatest``, ``rms`` and greatest magnitude ``max`` over the fibres of ``r - r_reference`` [mm]."""
+    """Statistics over the fibres of ``r - r_reference`` [mm]: ``mean``, ``rms``, minimum (``least``), maximum (``greatest``) and
+    maximum magnitude (``max``).
+    """
     if not context.joints or len(run.numbers) < 2:
         return ()
     found, expected = both_lengths(run, reference, context)
@@ -45,7 +47,7 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 
 
 def excursion_arms(lengths: Floats, context: MeasurementContext, numbers: Sequence[int]) -> Floats:
-    """``-dl/dtheta`` (f, k) [mm] of ``lengths`` (f, k) [mm] at the frames ``numbers``; NaN if no joint rotates alone."""
+    """The arms ``-dl/dtheta`` (f, k) [mm] from ``lengths`` (f, k) [mm] at frames ``numbers``; NaN if no joint rotates alone."""
     which, arms = turning(context.joints, context, numbers), np.full(lengths.shape, np.nan)
     for frame, i in enumerate(which):
         if i >= 0:
@@ -56,7 +58,7 @@ def excursion_arms(lengths: Floats, context: MeasurementContext, numbers: Sequen
 
 
 def turning(joints: Sequence[Joint], context: MeasurementContext, numbers: Sequence[int]) -> Ints:
-    """The index (f,) of the joint that rotates just before or after each frame while all other bones are at rest; -1 for none."""
+    """The index (f,) of the joint that rotates just before or after each frame while all other bones are at rest; -1 if none."""
     poses = np.array([[bone.pose(number) for bone in context.bones] for number in numbers])
     names, which = [bone.name for bone in context.bones], np.full(len(numbers), -1)
     for i, joint in enumerate(joints):
@@ -70,7 +72,7 @@ def turning(joints: Sequence[Joint], context: MeasurementContext, numbers: Seque
 
 
 def _near(angles: Floats, frame: int) -> list[int]:
-    """A ``frame`` and up to two others, the nearest in time, at different angles, between which the joint does not turn back."""
+    """The ``frame`` and up to two frames nearest in time with other angles, among which the joint does not reverse."""
     before = list(_onward(angles, range(frame - 1, -1, -1), frame))
     after = list(_onward(angles, range(frame + 1, len(angles)), frame))
     if before and after and (angles[frame] - angles[before[0]]) * (angles[after[0]] - angles[frame]) > 0:
@@ -79,7 +81,7 @@ def _near(angles: Floats, frame: int) -> list[int]:
 
 
 def _onward(angles: Floats, frames: range, start: int) -> Iterator[int]:
-    """Up to two of ``frames`` whose angles continue in one direction from the angle at ``start``."""
+    """Up to two of ``frames`` in which the angle continues in one direction from the angle at ``start``."""
     direction, last, found = 0.0, start, 0
     for frame in frames:
         step = float(angles[frame] - angles[last])
@@ -92,6 +94,6 @@ def _onward(angles: Floats, frames: range, start: int) -> Iterator[int]:
 
 
 def _weights(offsets: Floats) -> Floats:
-    """The weights (k,) of values at ``offsets`` (k,) for the slope at 0 of the polynomial through them."""
+    """The weights (k,) of values at ``offsets`` (k,) that give the slope at 0 of the polynomial through these values."""
     powers = np.arange(len(offsets))
     return np.asarray(np.linalg.solve(offsets[None, :] ** powers[:, None], (powers == 1).astype(float)))

@@ -1,4 +1,4 @@
-"""Depth of a run's muscle inside the other muscles of the same run, independent of the reference."""
+"""Depth to which the muscle of a run and the other muscles of the same run penetrate each other, independent of the reference."""
 
 from functools import lru_cache
 
@@ -23,16 +23,16 @@ OF, AGAINST = "surface", "itself"
 
 
 def measure(run: Run, _reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """``deepest`` [mm], as in ``geometry.interpenetration.penetration``: the greatest depth to which the surfaces of this muscle
-    and another penetrate each other, 0 if they are apart. NaN in a frame in which a surface is not known; no measure if the run has
-    no other muscle.
+    """``deepest`` [mm]: the maximum depth to which the surfaces of this muscle and another muscle penetrate each other, as in
+    ``geometry.interpenetration.penetration``; 0 if they are apart. NaN in frames in which a surface is not known. A run without
+    other muscles has no such measure.
     """
     return _measured(run) if run.others else ()
 
 
 @lru_cache(maxsize=32)
 def _measured(run: Run) -> tuple[Measure, ...]:
-    """The measures of a run, which are the same against every reference, computed once."""
+    """The measures of a run. They are the same against every reference and are computed once."""
     values, where = np.zeros(len(run.numbers)), [""] * len(run.numbers)
     for name, other in run.others.items():
         for i, number in enumerate(run.numbers):

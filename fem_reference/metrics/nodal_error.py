@@ -1,4 +1,4 @@
-"""Difference between a field and the exact solution at the vertices, if a case has an exact solution."""
+"""Error of a field at the vertices, for cases with a known exact solution."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ OF, AGAINST = "field", "exact"
 
 
 def measure(run: Run, _reference: Run, context: FieldContext) -> tuple[Measure, ...]:
-    """``max``, the greatest magnitude of the error over the vertices; no measure if no exact solution is known."""
+    """``max``: the maximum magnitude of the error over the vertices; no measure if no exact solution is known."""
     if context.exact is None:
         return ()
     errors = np.abs(run.vertex_values - at(context.exact, run.points))

@@ -1,6 +1,6 @@
 """Depth and volume of a run's muscle inside the bones, independent of the reference.
 
-The distance field is the field used for contact. Where the surface is exempt from contact, only the depth added since rest counts.
+The distance field is the same as for contact. Where the surface is exempt from contact, only the depth added since rest counts.
 """
 
 import logging
@@ -32,9 +32,9 @@ STATISTICS = {
 }
 OF, AGAINST = "surface", "itself"
 
-# A triangle is small enough to follow a bone if its edges are at most this many times the reach of ``Exemption``.
+# A triangle is small enough to follow a bone if its edges are at most this many times as long as the reach of ``Exemption``.
 _FOLLOWS = 4.0
-# A point deeper than this fraction of half the thickness is in the middle of a bone, and may leave the bone on the other side.
+# A point deeper than this fraction of half the thickness of a bone is near the centre, and may leave the bone on the other side.
 _MIDDLE = 0.75
 
 _value = attrgetter("value")
@@ -42,33 +42,34 @@ log = logging.getLogger(__name__)
 
 
 class _Worst(NamedTuple):
-    """The greatest depth or the volume of a frame, and its position in words."""
+    """The maximum depth or the volume in a frame (``value``), and its position in words."""
 
     value: float
     where: str
 
 
 def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """``deepest`` [mm], the greatest depth of the muscle below the surface of a bone, and ``volume`` [mm3] of the muscle inside
-    bones, without the part nearest to the exempt surface; 0 if nothing is inside.
+    """``deepest`` [mm]: the maximum depth of the muscle below the surface of a bone, 0 if nothing is inside. ``volume`` [mm3]: the
+    volume of the muscle inside bones, without the part that is nearest to the exempt surface.
 
-    A triangle follows a bone if its corners are at most r from the bone, with r the reach of ``Exemption``, and its edges at most
-    4 r long: a greater depth between its corners then only shows that a flat triangle cuts into a round bone. Depth is
-    measured at the vertices, and also between them in triangles that do not follow the bone. If the interior of the muscle
-    reaches the middle of the bone, the depth of the interior counts. Near an attachment only depth added since rest counts. The
-    same holds for an attachment inside another bone that moves differently; inside its own bone depth is not checked.
+    A triangle follows a bone if its corners are at most r from the bone and its edges at most 4 r long, where r is the reach of
+    ``Exemption``. A greater depth between its corners then only shows that a flat triangle cuts into a round bone. So depth is
+    measured at the vertices, and also between the vertices of triangles that do not follow the bone. If the interior of the muscle
+    reaches the centre of the bone, the depth of the interior counts. Near an attachment only the depth added since rest counts. The
+    same holds for an attachment inside another bone that moves differently. On an attachment inside its own bone, depth is not
+    checked.
 
-    The depth is as accurate as the field of the bone (``Grid.mean_error``, with rounding). The volume is estimated from random
-    points (``shared``). On the muscles of a hip, 12 volumes from 5 to 24 000 mm3 differed by less than 1 % from an estimate with
-    fifty times the points, and smaller volumes by less than 6 %. Values are NaN in a frame whose surface encloses no finite volume,
-    and in all frames if a bone is not closed and so has no inside.
+    The depth is as accurate as the distance field of the bone (``Grid.mean_error``, with rounding). The volume is estimated from
+    random points (``shared``). On the muscles of a hip, 12 volumes from 5 to 24 000 mm3 differed by less than 1 % from an estimate
+    with fifty times as many points, and smaller volumes by less than 6 %. Values are NaN in a frame in which the surface encloses
+    no finite volume, and in all frames if a bone is not closed and so has no inside.
     """
     return _measured(run, context)
 
 
 @lru_cache(maxsize=8)
 def _measured(run: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """The measures of a run, which are the same against every reference, computed once."""
+    """The measures of a run. They are the same against every reference and are computed once."""
     lost = _without_inside(context.bones)
     allowed = {} if lost else _allowed(context.exempt, context.bones, run.numbers)
     frames = [
@@ -84,7 +85,7 @@ def _measured(run: Run, context: MeasurementContext) -> tuple[Measure, ...]:
 
 @np.errstate(over="ignore", invalid="ignore")
 def _frame(surface: Surface, number: int, context: MeasurementContext, allowed: dict[str, Floats]) -> list[_Worst]:
-    """Depth and volume of one frame, NaN if the surface encloses no finite volume."""
+    """The depth and the volume in one frame, NaN if the surface encloses no finite volume."""
     if not np.isfinite(enclosed_volume(surface.points, surface.triangles)):
         return [_Worst(np.nan, "")] * 2
     exempt, deepest, volume, largest = context.exempt, _Worst(0.0, ""), 0.0, _Worst(0.0, "")
@@ -103,7 +104,9 @@ def _frame(surface: Surface, number: int, context: MeasurementContext, allowed: 
 
 
 def _deepest(exempt: Exemption, fine: Surface, bone: str, gaps: Floats, allowed: Floats) -> _Worst:
-    """The greatest depth beyond the ``allowed`` (k,) depth at the points of a divided surface, with ``gaps`` (k,) to a bone."""
+    """The maximum depth in excess of the ``allowed`` (k,) depth at the points of a divided surface (``fine``). ``gaps`` (k,) [mm]:
+    the distances of these points from the ``bone``.
+    """
     corners, reach = exempt.corners, exempt.reach
     triangles = corners.vertices[exempt.surface.triangles]
     lengths = edge_lengths(exempt.surface.points[exempt.surface.triangles])
@@ -119,8 +122,8 @@ def _deepest(exempt: Exemption, fine: Surface, bone: str, gaps: Floats, allowed:
 
 
 def _allowed(exempt: Exemption, bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> dict[str, Floats]:
-    """The allowed depth [mm] at the corners (k,) of the pieces of a surface, by bone. It is 0 where contact acts, the depth at rest
-    near attachments, and infinite on attachments to this bone or to a bone that moves in the same way at all frame ``numbers``.
+    """The allowed depth (k,) [mm] at the corners of the pieces of a surface, by bone: 0 where contact acts, the depth at rest near
+    attachments, and infinite on attachments to this bone or to a bone that moves in the same way in all frames ``numbers``.
     """
     near, on = exempt.corners.away <= exempt.reach, exempt.corners.away == 0
     rest = exempt.corners.carried @ exempt.surface.points
@@ -134,13 +137,13 @@ def _allowed(exempt: Exemption, bones: tuple[Bone, ...], numbers: tuple[int, ...
 
 
 def _alike(bone: Bone, name: str, bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> bool:
-    """True if a ``bone`` has this ``name`` or moves like the bone of this name."""
+    """True if the ``bone`` has this ``name``, or if it moves like the bone of this name."""
     own = next((other for other in bones if other.name == name), bone)
     return own.name == name and all(np.allclose(own.pose(frame), bone.pose(frame)) for frame in numbers)
 
 
 def _without_inside(bones: tuple[Bone, ...]) -> str:
-    """The bone that has no inside, and the reason; an empty string if every bone has an inside."""
+    """The first bone that has no inside, and the reason, in words; empty if every bone has an inside."""
     for bone in bones:
         try:
             _ = bone.shape

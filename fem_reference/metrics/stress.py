@@ -1,8 +1,8 @@
 """Stresses in the volume of a muscle, from solvers that compute them: means and quantiles over the volume at rest.
 
-The stresses are the Cauchy stress along the present fibres, the von Mises stress, and the pressure, above 0 in compression, at four
-points of each tetrahedron. The greatest stress is not measured: at the rim of an attachment it grows without bound on finer meshes.
-Runs without stresses have no such measures.
+The stresses are the Cauchy stress along the present fibres, the von Mises stress, and the pressure, which is positive in
+compression, at four points of each tetrahedron. The maximum stress is not measured: at the rim of an attachment it grows without
+bound as the mesh is refined. Runs without stresses have no such measures.
 """
 
 from functools import partial
@@ -29,7 +29,7 @@ _KILO = 1000.0  # kPa per MPa
 
 
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:  # noqa: ARG001
-    """The differences [kPa] from the reference; against rest, the stresses themselves."""
+    """The differences [kPa] from the reference; relative to rest, the stresses themselves."""
     found = {}
     for name in STATISTICS:
         own, other = (one.scalars.get(f"stress_{name}") for one in (run, reference))

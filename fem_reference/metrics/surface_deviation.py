@@ -1,5 +1,7 @@
-"""Distance of a run's surface from the reference's surface: material (the same vertex) and geometric (the closest point). A surface
-that slides along itself deviates materially but not geometrically. All means are weighted by the area around each vertex at rest.
+"""Distance between a run's surface and the reference's surface: material (same vertex) and geometric (closest point).
+
+A surface that slides along itself deviates materially but not geometrically. All means are weighted by the area around each vertex
+at rest.
 """
 
 import numpy as np
@@ -35,11 +37,11 @@ OF, AGAINST = "surface", "reference"
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Material: ``rms``, ``p95`` (area-weighted 95th percentile) and ``max`` of the distance between corresponding vertices [mm].
+    """Material: ``rms``, ``p95`` (area-weighted 95th percentile) and ``max`` of the distances between corresponding vertices [mm].
 
-    Geometric: ``distance_mean``, ``distance_rms`` and ``hausdorff`` [mm] of the distances from the vertices of each surface to the
-    closest point of the other surface. Only vertices are sampled, so ``hausdorff`` is a lower bound on the Hausdorff distance. Each
-    statistic is also given as ``..._percent`` of the reference's greatest displacement.
+    Geometric: ``distance_mean``, ``distance_rms`` and ``hausdorff`` (maximum) of the distances [mm] from the vertices of each
+    surface to the closest point of the other surface. Only vertices are sampled, so ``hausdorff`` is a lower bound on the Hausdorff
+    distance. Each statistic is also given as ``..._percent``, relative to the maximum displacement of the reference.
     """
     material = np.linalg.norm(run.positions - reference.positions, axis=2)
     geometric = np.array([_both_directions(run, reference, frame) for frame in range(len(reference.positions))])
@@ -63,7 +65,9 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
 
 
 def _both_directions(run: Run, reference: Run, frame: int) -> Floats:
-    """Distances (2n,) [mm] of vertices of the run to the reference's surface and the reverse; NaN if not finite."""
+    """The distances (2n,) [mm] from the vertices of the run to the reference's surface, and from the vertices of the reference to
+    the run's surface; NaN if a position is not finite.
+    """
     here, there = (each.surface.moved_to(each.positions[frame]) for each in (run, reference))
     if np.array_equal(here.points, there.points):
         return np.zeros(len(here.points) + len(there.points))
@@ -73,14 +77,14 @@ def _both_directions(run: Run, reference: Run, frame: int) -> Floats:
 
 
 def _percent(values: Floats, travel: float) -> Floats:
-    """``values`` (f,) [mm] in per cent of ``travel`` [mm]; for a travel of 0, values of 0 give 0 and all others give infinity."""
+    """The ``values`` (f,) [mm] in per cent of ``travel`` [mm]. For a travel of 0, values of 0 give 0 and others infinity."""
     if travel == 0:
         return np.where(values == 0, 0.0, values + np.inf)
     return np.asarray(100 * values / travel)
 
 
 def _worst(deviations: Floats, reference: Run) -> tuple[str, ...]:
-    """The vertex with the greatest deviation in each frame, and its position in the reference."""
+    """The vertex with the largest deviation in each frame and its position in the reference, in words."""
     vertices = np.argmax(deviations, axis=1) % len(reference.surface.points)
     return tuple(
         f"vertex {vertex} at {place_of(at)}"

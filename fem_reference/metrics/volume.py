@@ -24,7 +24,7 @@ OF, AGAINST = "surface", "reference"
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """``deviation`` = V / V_reference - 1 [%] and ``deviation_volume`` = V - V_reference [mm3] of the volume V."""
+    """``deviation``: V / V_reference - 1 [%]. ``deviation_volume``: V - V_reference [mm3]. V is the enclosed volume."""
     volumes, wanted = (
         np.array([enclosed_volume(positions, each.surface.triangles) for positions in each.positions])
         for each in (run, reference)

@@ -118,7 +118,7 @@ def test_a_file_that_is_damaged_or_somebody_elses_is_neither_read_nor_written_ov
 
 def test_other_frames_are_reported(path) -> None:
     path.write_text(path.read_text().replace("[0, 10, 20]", "[0, 10, 30]"))
-    with pytest.raises(InputError, match="frames: got 3 numbers that differ from the scene's, want its frame numbers"):
+    with pytest.raises(InputError, match="frames: got 3 frame numbers that differ from the scene's, want the scene's"):
         baseline.read(path, SCENE, "mine")
 
 

@@ -203,7 +203,7 @@ def test_a_signal_to_the_command_judges_no_entry(number, lost, caplog, monkeypat
 def test_an_entry_without_a_value_fails(monkeypatch) -> None:
     monkeypatch.setattr(runner, "HEARD", 0.0)
     none, other = runner.run([entry("none", lambda _: None), entry("other")], Labs())
-    assert (none.word, none.finding.note, other.word) == ("fail", "it measured no value", "pass")
+    assert (none.word, none.finding.note, other.word) == ("fail", "no value was measured", "pass")
 
 
 def test_entries_that_fail_with_a_number_wait_for_no_signal(monkeypatch) -> None:

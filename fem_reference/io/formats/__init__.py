@@ -1,7 +1,7 @@
-"""Formats of surface meshes: one module each, discovered in this folder.
+"""Formats of surface meshes: one module for each, found automatically in this folder.
 
-Each module defines ``FORMAT``. Contract (tests/contracts/test_every_format.py): a surface that is written is read back bit for
-bit, and a truncated file is rejected.
+Each module defines ``FORMAT``. Contract (tests/contracts/test_every_format.py): a surface that is written is read back bit for bit,
+and a truncated file is rejected.
 """
 
 import importlib
@@ -17,11 +17,12 @@ from fem_reference.io.soup import Soup
 
 @dataclass(frozen=True)
 class Format:
-    """A mesh format, recognised by the ``suffixes`` of its files, in lower case with their dots. ``read``: returns points and
-    triangles as in the file; raises any exception if the file is incomplete. ``write``: writes the surface and, if the format has
-    point data, its displacement (n, 3) [mm]; None if the format can only be read. ``shares_points``: True if triangles index a
-    common list of points, whose order is kept; otherwise each has its own three points. ``states_size``: True if a file states its
-    size; otherwise truncation between two lines is not noticed.
+    """A mesh format, recognised by the ``suffixes`` of its files, which are in lower case and include the dot.
+
+    ``read``: returns points and triangles as they are in the file, and raises any exception if the file is incomplete. ``write``:
+    writes the surface and, if the format has point data, its displacement (n, 3) [mm]; None if the format can only be read.
+    ``shares_points``: True if triangles refer to a common list of points, whose order is kept; False if each triangle has three
+    points of its own. ``states_size``: True if a file states its size; otherwise truncation between two lines is not noticed.
     """
 
     suffixes: tuple[str, ...]
@@ -33,7 +34,7 @@ class Format:
 
 @cache
 def formats() -> dict[str, Format]:
-    """Every format, by the suffix of its files; TypeError if a module defines no format, or the suffix of another format."""
+    """All formats by the suffix of their files. Raises TypeError if a module defines no format, or a suffix of another format."""
     found: dict[str, Format] = {}
     for name in (name for name in modules.names(__path__) if not name.startswith("_")):
         one = vars(importlib.import_module(f"{__name__}.{name}")).get("FORMAT")

@@ -1,4 +1,4 @@
-"""VTK's legacy format, text or binary, read with numpy alone: no array is larger than the bytes of the file allow."""
+"""VTK's legacy format, text or binary, read with numpy alone. No array is larger than the number of bytes in the file allows."""
 
 import re
 from itertools import islice
@@ -16,13 +16,13 @@ _TYPES = {
     "unsigned_char": "u1", "unsigned_short": "u2", "unsigned_int": "u4", "unsigned_long": "u8", "vtktypeuint32": "u4",
     "vtktypeuint64": "u8", "vtkidtype": "i4", "float": "f4", "double": "f8",
 }  # fmt: skip
-# Attributes with a fixed number of components, and this number; the third word of their line is the type.
+# Attributes with a fixed number of components, which is given here. The third word of their line is the type.
 _COMPONENTS = {"VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6}
 _COMPONENTS |= dict.fromkeys(("GLOBAL_IDS", "PEDIGREE_IDS", "EDGE_FLAGS"), 1)
 
 
 def read(data: bytes) -> DataSet:
-    """The data set of a file; other sections are skipped. ValueError or another exception if it is incomplete."""
+    """The data set in the bytes of a file; other sections are skipped. Raises ValueError or another exception if incomplete."""
     head = _HEAD.match(data)
     if head is None:
         raise ValueError("no header of a VTK file")
@@ -49,13 +49,13 @@ def read(data: bytes) -> DataSet:
 
 
 class _File:
-    """The bytes of a file, text or binary, read from ``at`` on; ``values``: the number of values of each attribute."""
+    """The bytes of a file, text or binary, read from position ``at`` on; ``values``: the number of values of each attribute."""
 
     def __init__(self, data: bytes, at: int, *, text: bool) -> None:
         self.data, self.at, self.text, self.values = data, at, text, "0"
 
     def line(self) -> list[str]:
-        """The words of the next line that is not empty; none at the end."""
+        """The words of the next line that is not empty; no words at the end of the file."""
         words = list[str]()
         while not words and self.at < len(self.data):
             end = self.data.find(b"\n", self.at)
@@ -65,7 +65,7 @@ class _File:
         return words
 
     def array(self, number: str, kind: str, components: int = 1) -> Any:
-        """``number`` times ``components`` values of a ``kind``; ValueError if there are fewer."""
+        """The next ``number`` times ``components`` values of type ``kind``. Raises ValueError if there are fewer."""
         if kind.lower() not in _TYPES:
             raise ValueError(f'numbers of type "{kind}"')
         dtype, count = np.dtype(">" + _TYPES[kind.lower()]), whole_number(number, "a count") * components
@@ -83,7 +83,7 @@ class _File:
             return values.astype(np.float64 if dtype.kind == "f" else np.int64).astype(dtype.newbyteorder("="))
 
     def cells(self, count: str, size: str) -> tuple[Any, Any]:
-        """Sizes of cells and their corners, before version 5 of the format: each cell is preceded by its size."""
+        """The sizes of cells and their corners, as stored before version 5 of the format: each cell is preceded by its size."""
         values = self.array(size, "int").tolist()
         sizes, corners, at = list[int](), list[int](), 0
         while at < len(values):
@@ -94,21 +94,21 @@ class _File:
         return sizes, corners
 
     def cells_by_offsets(self, count: str, size: str) -> tuple[Any, Any]:
-        """Sizes of cells and their corners, from version 5 of the format on."""
+        """The sizes of cells and their corners, as stored since version 5 of the format."""
         offsets, corners = self._named("OFFSETS", count), self._named("CONNECTIVITY", size)
         if len(offsets) and offsets[0] != 0:
             raise ValueError("offsets that do not begin with 0")
         return np.diff(np.asarray(offsets, np.int64)), corners
 
     def _named(self, name: str, count: str) -> Any:
-        """The array after a line with its ``name`` and its type."""
+        """The array after a line that consists of its ``name`` and its type."""
         words = self.line()
         if words[:1] != [name]:
             raise ValueError(f"no {name} of cells")
         return self.array(count, words[1])
 
     def skip(self, name: str, words: list[str]) -> None:
-        """Skip a section, which begins with a line of ``words``; ValueError if its arrays are incomplete."""
+        """Skip the section ``name``, which begins with a line of ``words``. Raises ValueError if its arrays are incomplete."""
         of_bytes = "float" if self.text else "unsigned_char"
         if name in ("POINT_DATA", "CELL_DATA"):
             self.values = words[1]

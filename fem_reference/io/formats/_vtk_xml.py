@@ -1,6 +1,6 @@
-"""VTK's XML formats, read with numpy alone: no array is larger than the bytes of the file allow.
+"""VTK's XML formats, read with numpy alone. No array is larger than the number of bytes in the file allows.
 
-VTK's own readers are native code that trusts a file: a wrong number in the file crashes or hangs the process.
+VTK's own readers are native code that trusts the file: a wrong number in a file can crash or hang the process.
 """
 
 import base64
@@ -22,20 +22,20 @@ _KINDS = {"PolyData": ("Lines", "Strips", "Polys"), "UnstructuredGrid": ("Cells"
 _TYPES = {"Float32": "f4", "Float64": "f8"}
 _TYPES |= {f"{sign}Int{8 * size}": f"{sign or 'i'}{size}".lower() for sign in ("", "U") for size in (1, 2, 4, 8)}
 _END = re.compile(rb"</AppendedData>\s*</VTKFile>\s*\Z")
-# The maximum size in bytes of a compressed array after it is expanded.
+# The maximum size in bytes of a compressed array after decompression.
 _MOST = 2**28
 
 
 def read(data: bytes) -> DataSet:
-    """The data set of a file, with its pieces joined; ValueError or another exception if it is invalid or incomplete."""
+    """The data set in the bytes of a file, with its pieces joined. Raises ValueError or another exception if invalid."""
     head, mark, appended = data.partition(b"<AppendedData")
     check_no_entities(head)
     if mark and not _END.search(data, max(0, len(data) - 1000)):
         raise ValueError("no end of the appended data")
     root = fromstring(head + b"</VTKFile>" if mark else data)
-    kind = root.get("type", "nothing")
+    kind = root.get("type", "unknown")
     if root.tag != "VTKFile" or kind not in _KINDS:
-        raise ValueError(f"a VTK file of {kind}, neither {' nor '.join(_KINDS)}")
+        raise ValueError(f"a VTK file of type {kind}, neither {' nor '.join(_KINDS)}")
     arrays, first = _Arrays(root, appended), 0
     points, types = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
     cells = {name: [PointLists(types[0], types[0])] for name in _KINDS[kind]}
@@ -62,7 +62,9 @@ def _points(piece: Element, arrays: "_Arrays") -> Any:
 
 
 def _cells(piece: Element, name: str, arrays: "_Arrays", points: int) -> tuple[Ints, Ints, Ints]:
-    """Sizes, corners and types of the cells of a piece by ``name``, for a number of ``points``; polygons have no types."""
+    """The sizes, the corners and the types of the cells of a ``piece`` that are called ``name``; ``points``: the number of points
+    of the piece. Only the cells of a grid have types.
+    """
     count, found = _number_of(piece, name), {one.get("Name"): one for one in piece.findall(f"{name}/DataArray")}
     wanted = ("offsets", "connectivity", *(["types"] if name == "Cells" else []))
     ends, corners, *types = (np.asarray(arrays.read(found[key]) if count else [], np.int64) for key in wanted)
@@ -73,7 +75,9 @@ def _cells(piece: Element, name: str, arrays: "_Arrays", points: int) -> tuple[I
 
 
 class _Arrays:
-    """The arrays of a file with a ``root`` element and ``appended`` data, which begin after the tag of their element."""
+    """The arrays of a file with the given ``root`` element. ``appended``: the bytes that follow ``<AppendedData``, or none: the
+    rest of this tag and then, after the character ``_``, the data to which arrays refer.
+    """
 
     def __init__(self, root: Element, appended: bytes) -> None:
         self.order = ">" if root.get("byte_order") == "BigEndian" else "<"
@@ -85,7 +89,7 @@ class _Arrays:
         self.encoded = b"base64" in attributes
 
     def read(self, array: Element) -> Any:
-        """The numbers of a DataArray, in one dimension."""
+        """The values of a DataArray, in one dimension."""
         kind, form, text = _TYPES.get(array.get("type", "")), array.get("format", "ascii"), array.text or ""
         if kind is None:
             raise ValueError(f'an array of type "{array.get("type")}"')
@@ -101,7 +105,9 @@ class _Arrays:
         return np.frombuffer(self._bytes(data, _decoded if encoded else _taken), self.order + kind)
 
     def _bytes(self, data: memoryview, take: Callable[[memoryview, int], bytes]) -> bytes:
-        """Bytes stored at the beginning of ``data``, after a header with their number or with the lengths of compressed blocks."""
+        """The bytes stored at the beginning of ``data``, where a header states their number or the lengths of compressed blocks.
+        ``take``: a function that returns a number of bytes from the beginning of the data.
+        """
         size = self.header.itemsize
         if not self.compressor:
             (count,) = np.frombuffer(take(data, size), self.header).tolist()
@@ -109,7 +115,9 @@ class _Arrays:
         blocks, block, last = np.frombuffer(take(data, 3 * size), self.header).tolist()
         total = (blocks - 1) * block + (last or block) if blocks else 0
         if total > _MOST or blocks * size > len(data):
-            raise ValueError(f"an array of {total} bytes, more than {_MOST} or than the file has blocks for")
+            raise ValueError(
+                f"an array of {total} bytes in {blocks} blocks: too large, or more blocks than fit in the file"
+            )
         head = size * (3 + blocks)
         lengths = np.frombuffer(take(data, head), self.header)[3:].tolist()
         packed = take(data[4 * -(-head // 3) if take is _decoded else head :], sum(lengths))
@@ -138,12 +146,12 @@ def _of_lz4(packed: bytes, wanted: int) -> bytes:
     import pyvista
     from vtkmodules.vtkIOCore import vtkLZ4DataCompressor
 
-    found = bytearray(min(wanted, 256 * len(packed)))  # a byte of LZ4 expands to at most 255
+    found = bytearray(min(wanted, 256 * len(packed)))  # a byte of LZ4 expands to at most 255 bytes
     with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False):
         return bytes(found[: vtkLZ4DataCompressor().Uncompress(packed, len(packed), found, len(found))])
 
 
-# Functions that unpack a block to a wanted length; if the block is too long, they return one byte more.
+# Functions that unpack a block to an expected length. If the block is longer, they return one byte more than this length.
 _UNPACKING: dict[str, Callable[[bytes, int], bytes]] = {
     "vtkZLibDataCompressor": lambda packed, most: zlib.decompressobj().decompress(packed, most + 1),
     "vtkLZMADataCompressor": lambda packed, most: lzma.LZMADecompressor(memlimit=_MOST).decompress(packed, most + 1),
@@ -152,7 +160,7 @@ _UNPACKING: dict[str, Callable[[bytes, int], bytes]] = {
 
 
 def _numbers(text: str, dtype: np.dtype[Any]) -> Any:
-    """The numbers in a text; ValueError if a word is not a number."""
+    """The numbers in a ``text``. Raises ValueError if a word is not a number."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
         try:

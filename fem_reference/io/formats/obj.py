@@ -7,7 +7,7 @@ from fem_reference.io.soup import Soup, only_triangles, positions
 
 
 def _read(path: Path) -> Soup:
-    """The positions and faces of an OBJ file; corners are counted from 1, or backwards from the last position."""
+    """The positions and faces in an OBJ file. Corners are counted from 1, or, if negative, backwards from the last position."""
     points: list[list[float]] = []
     triangles = []
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():

@@ -8,7 +8,7 @@ from fem_reference.io.soup import Soup, only_triangles, positions
 
 
 def _read(path: Path) -> Soup:
-    """The positions and faces of an OFF file in text form; colours are skipped."""
+    """The positions and faces in an OFF file in text form; colours are skipped."""
     text = re.sub(r"#[^\n]*", "", path.read_text(encoding="utf-8"))
     parts = re.match(r"\s*C?N?OFF\s+(\d+)\s+(\d+)\s+\d+\s+(.*)", text, re.DOTALL)
     if parts is None:

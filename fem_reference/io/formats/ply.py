@@ -17,7 +17,7 @@ _CORNERS = ("vertex_indices", "vertex_index")
 
 
 def _read(path: Path) -> Soup:
-    """The positions and faces of a PLY file, text or binary; a list must have the same length in all rows of an element."""
+    """The positions and faces in a PLY file, text or binary. A list must have the same length in all rows of an element."""
     parts = re.match(rb"ply\s(.*?)end_header\r?\n(.*)", path.read_bytes(), re.DOTALL)
     if parts is None:
         raise ValueError("no PLY header")
@@ -41,7 +41,7 @@ def _read(path: Path) -> Soup:
 
 
 def _element(body: bytes, count: int, properties: list[list[str]], types: dict[str, str]) -> tuple[Any, bytes]:
-    """The table of an element and the bytes after it; the first row states the length of its lists."""
+    """The table of an element, and the bytes that follow it. The lengths of lists are taken from the first row."""
     fields: list[tuple[Any, ...]] = []
     for *kind, name in properties:
         if kind[0] == "list":

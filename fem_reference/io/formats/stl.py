@@ -12,7 +12,7 @@ _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute
 
 
 def _read(path: Path) -> Soup:
-    """The triangles of an STL file, text or binary: three points for each, in the order of the file."""
+    """The triangles in an STL file, text or binary, with three points for each triangle, in the order of the file."""
     data = path.read_bytes()
     count = int.from_bytes(data[80:84], "little")
     if len(data) >= 84 and len(data) == 84 + 50 * count:

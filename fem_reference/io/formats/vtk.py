@@ -1,4 +1,4 @@
-"""VTK's own formats, legacy and XML: read with numpy, written by pyvista."""
+"""The formats of VTK, legacy and XML, read with numpy and written by pyvista."""
 
 import errno
 import os
@@ -13,16 +13,16 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.io.formats import Format, _vtk_legacy, _vtk_xml
 from fem_reference.io.soup import DataSet, Soup, check_lengths, joined, only_triangles
 
-_TRIANGLE = 5  # VTK's number for this type of cell
-_NO_ROOM = 20007  # VTK's number for a full disk; other errors of the system keep their numbers
+_TRIANGLE = 5  # VTK's number for triangles
+_NO_ROOM = 20007  # VTK's error code for a full disk; other system errors keep their numbers
 LINES = (".vtk", ".vtp")  # the suffixes of the formats that have polylines
 _WRITERS = {".vtk": "PolyDataWriter", ".vtp": "XMLPolyDataWriter", ".vtu": "XMLUnstructuredGridWriter"}
 
 
 @dataclass(frozen=True, eq=False)
 class DataBlock:
-    """``cells`` between ``points`` (n, 3) [mm]: triangles (m, 3), tetrahedra (m, 4) or lines. By name, arrays ``of_points``
-    (n, ...) and ``of_cells`` (m, ...), and ``numbers`` for the entire block.
+    """A block of data: ``cells`` between ``points`` (n, 3) [mm], which are triangles (m, 3), tetrahedra (m, 4) or lines.
+    ``of_points`` and ``of_cells``: arrays by name, (n, ...) and (m, ...). ``numbers``: by name, values for the entire block.
     """
 
     points: Floats
@@ -36,7 +36,7 @@ type Tree = Mapping[str, "DataBlock | Tree"]
 
 
 def _read(path: Path) -> Soup:
-    """Polygons of VTK polydata, or the cells of an unstructured grid (points and lines of polydata are skipped)."""
+    """The polygons of VTK polydata, or the cells of an unstructured grid. Vertices and lines of polydata are skipped."""
     data = data_set(path)
     if data.kind == "UnstructuredGrid" and (other := set(data.types.tolist()) - {_TRIANGLE}):
         raise ValueError(f"cells of VTK type {', '.join(map(str, sorted(other)))}")
@@ -50,8 +50,8 @@ def _read(path: Path) -> Soup:
 
 
 def read_lines(path: Path, *, moved: bool) -> tuple[Floats, list[list[int]]]:
-    """Points (n, 3) of the file and the points of each line. ValueError for a line of one point and, unless ``moved``, for a point
-    that is not finite or a line without length.
+    """The points (n, 3) in the file, and the point numbers of each line. Raises ValueError for a line of one point and, unless
+    ``moved``, for a point that is not finite or a line without length.
     """
     data = data_set(path)
     found = data.cells.get("Lines")
@@ -68,27 +68,27 @@ def read_lines(path: Path, *, moved: bool) -> tuple[Floats, list[list[int]]]:
 
 
 def data_set(path: Path) -> DataSet:
-    """The points and cells of a VTK file."""
+    """The points and cells in a VTK file."""
     read = _vtk_legacy.read if path.suffix.lower() == ".vtk" else _vtk_xml.read
     return read(path.read_bytes())
 
 
 def save(path: Path, points: Floats, cells: Ints | Polylines, displacement: Floats) -> None:
-    """Write ``cells`` (in VTU as an unstructured grid) with point data ``displacement`` (n, 3) [mm]; OSError if that fails."""
+    """Write ``cells`` with point data ``displacement`` (n, 3) [mm], in VTU as an unstructured grid. OSError if that fails."""
     data, suffix = _data_set(DataBlock(points, cells)), path.suffix.lower()
     data.point_data.set_vectors(displacement, "displacement")
     _finish(_WRITERS[suffix], path, data.cast_to_unstructured_grid() if suffix == ".vtu" else data)
 
 
 def _finish(kind: str, path: Path, data: Any) -> None:
-    """Write ``data`` by VTK's writer of a ``kind``, without its messages; OSError if that fails."""
+    """Write ``data`` with VTK's writer ``kind``, without its messages. Raises OSError if that fails."""
     import pyvista
 
     with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False):
         writer = getattr(pyvista, kind)(path, data)
         if path.suffix.lower() == ".vtk":
             writer.writer.SetFileTypeToBinary()
-        else:  # in the other modes VTK cannot read back a displacement that is not finite
+        else:  # written in other modes, a displacement that is not finite cannot be read back by VTK
             writer.writer.SetDataModeToAppended()
         writer.write()
     if code := writer.writer.GetErrorCode():
@@ -97,7 +97,9 @@ def _finish(kind: str, path: Path, data: Any) -> None:
 
 
 def write_blocks(path: Path, blocks: Tree) -> None:
-    """Write a VTM file of ``blocks`` by name, with their files in a folder next to it, not atomically; OSError if that fails."""
+    """Write a VTM file of ``blocks`` by name, and their files into a folder next to it. If writing fails, it raises OSError, and
+    some files may have been written.
+    """
     _finish("XMLMultiBlockDataWriter", path, _collection(blocks))
 
 
@@ -109,7 +111,7 @@ def _collection(blocks: Tree) -> Any:
 
 
 def _data_set(block: DataBlock) -> Any:
-    """The points, cells and arrays of a block as a data set of pyvista."""
+    """The points, cells and arrays of a ``block`` as a pyvista data set."""
     import pyvista
 
     points = np.array(block.points, np.float64)
