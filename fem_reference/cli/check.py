@@ -54,7 +54,8 @@ def run(options: argparse.Namespace) -> int:
     (baseline.check if options.update else baseline.read)(options.baseline, scene, entry.name)
     candidate = bench.obtain(entry.name, entry, place)  # before the reference, because the candidate may be bad input
     solved = whole.reference()
-    # The folder is that of the run of all muscles. The baseline stores it, so a change of a neighbouring muscle is reported.
+    # The folder is that of the run of all muscles. The baseline stores its name, which contains a hash of the scene, the settings
+    # and the code. If a neighbouring muscle has changed, the name differs from the stored name, and ``check`` reports this.
     reference = replace(by_muscle.split(whole, solved)[muscle], folder=solved.folder) if muscle else solved
     failed = [one for one in (reference, candidate) if one.outcome.status != "converged"]
     if failed:

@@ -26,9 +26,12 @@ class Damping(Energy):
     coefficient: VolumeDamping
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The lag estimated from the deflection of a beam under transverse drag and the shift of a bar under axial drag."""
+        """The distance by which drag makes the muscle lag behind its motion without drag.
+
+        The estimate is the deflection of a beam under transverse drag plus the axial displacement of a bar under axial drag.
+        """
         force, sideways = (self.coefficient * scene.in_time(speed) for speed in (scene.speed, scene.sideways))
-        rule, stress = "drag per cross-section divided by the shear modulus", force * scene.length
+        rule, stress = "drag per unit cross-sectional area divided by the shear modulus", force * scene.length
         lag = scene.lag(scene.bend(sideways) + scene.draw(force))
         return Indicator(rule, stress / scene.shear, lag, stress)
 

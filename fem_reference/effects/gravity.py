@@ -25,7 +25,7 @@ class Gravity(Ramped, Energy):
     def indicator(self, scene: Estimates) -> Indicator:
         """The sag of a beam under the weight."""
         force = scene.greatest(self) * self.density * math.hypot(*self.acceleration)
-        rule, stress = "weight per cross-section divided by the shear modulus", force * scene.length
+        rule, stress = "weight per unit cross-sectional area divided by the shear modulus", force * scene.length
         return Indicator(rule, stress / scene.shear, scene.bend(force), stress)
 
     def resultant(self, shape: Shape) -> Wrench:

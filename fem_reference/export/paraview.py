@@ -1,6 +1,7 @@
 """Export of all runs of a case to ParaView, as a collection of named blocks.
 
-The points of each block are at rest. The ParaView filter "Warp By Vector" moves them by the array ``displacement``. The files are:
+The points of each block are stored at their rest positions. The ParaView filter "Warp By Vector" moves them by the array
+``displacement``. The files are:
 
 forces.csv               force, point of application, moment and moment arm for each run, frame and bone
 runs.pvd                 list of the frames with their times [s], or with their numbers if the case states no time

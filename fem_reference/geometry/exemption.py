@@ -13,11 +13,11 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, corne
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.skins import Pieces, Skin, cut, embedded, points, spacing
 
-# The cosine of 120 degrees. If the normals at a point and at the attached part enclose a larger angle, the point is on the other
-# side of a thin body.
+# The cosine of 120 degrees. If the angle between the surface normal at a point and the normal of the nearest attached triangle is
+# larger, the point is on the other side of a thin body.
 _SAME_SIDE = -0.5
-# The distance of a corner is sampled slightly inside the piece, at this fraction of the way from the corner to the centroid.
-# So a corner on a sharp edge is sampled on the face of its own piece.
+# The distance from the corner of a piece to the attached part is computed at a point slightly inside the piece, at this fraction of
+# the way from the corner to the centroid. So a corner on a sharp edge is treated as a point on the face of its own piece.
 _INWARD = 1e-3
 
 
@@ -44,8 +44,9 @@ class Exemption:
     ``part`` (r, 3, 3) [mm]: corners of the triangles of the attached part. ``by`` (r,): index of the attachment to which each of
     these triangles belongs. ``names``: for each attachment, the name of its bone.
 
-    The reach equals the ``spacing`` of contact points, because the area that belongs to a contact point closer to the attached part
-    would include attached area. The reach depends on the size of the surface and not on its triangulation.
+    The reach equals the ``spacing`` of contact points. If a contact point were less than this distance from the attached part, the
+    area that belongs to the point would include attached area. The reach depends on the size of the surface and not on its
+    triangulation.
     """
 
     surface: Surface
@@ -88,7 +89,10 @@ class Exemption:
 
     @cached_property
     def corners(self) -> Corners:
-        """The corners of the pieces. The distance of a corner is the minimum over all pieces that share the corner."""
+        """The corners of the pieces.
+
+        The distance of a corner from the attached part is the minimum over all pieces to which the corner belongs.
+        """
         triangles, pieces, count = self.surface.triangles, self.pieces, len(self.surface.points)
         weights = pieces.corners.reshape(-1, 3)
         named = np.where(weights > 0, np.repeat(triangles[pieces.parents], 3, axis=0), count)
@@ -153,7 +157,7 @@ def _distinct(rows: Floats) -> tuple[Floats, Ints]:
 def free_skin(exempt: Exemption, mesh: TetMesh, apart: float) -> Skin:
     """The material points of a surface that can be in contact, embedded in a ``mesh``.
 
-    ``exempt``: the surface and its exempt part. ``apart``: maximum mean distance between neighbouring points [mm].
+    ``exempt``: the surface and its exempt part. ``apart``: upper limit of the mean distance between neighbouring points [mm].
     """
     surface = exempt.surface
     pieces = cut(surface, np.arange(len(surface.triangles)), apart)

@@ -1,7 +1,7 @@
 """Lengths of the edges of the surface in a run, compared with the reference, in per cent of the rest length of each edge.
 
-If the surface is compared with the rest state instead, the values are the edge extension of the report (l / L of Figs 6.15 to 6.17)
-minus one.
+If the surface is compared with the rest state instead, the values are l / L - 1 in per cent, where l is the length of an edge and L
+its length at rest. The report calls l / L the edge extension (Figs 6.15 to 6.17).
 """
 
 import numpy as np
@@ -27,7 +27,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
     ``mean``: the signed mean. ``rms``: the root mean square. ``p95`` and ``max``: the 95th percentile and the maximum of the
     magnitude. The weight of an edge is its area at rest, a third of the area of the two adjacent triangles; ``max`` has no weights.
-    ``mean_of_edges``: the signed mean with the same weight for every edge, as in the report.
+    ``mean_of_edges``: the signed mean with the same weight for every edge, as in the report (Figs 6.15 to 6.17).
     """
     edges = Edges.of(reference.surface)
     lengths, wanted = (np.array([edges.lengths(points) for points in each.positions]) for each in (run, reference))

@@ -6,10 +6,11 @@ radii shrink where the rod is stretched. Shape matching couples the rods of a bu
 of neighbouring points, and the scale also applies to their radii. The surface of the muscle moves with the rods.
 
 Here each fibre of the case is a rod. In the constraints on bending and twist, the bone nearest to each end of a rod acts like a
-neighbouring segment. The solver is quasi-static and has no mass: each frame number starts from the previous state, moved by a
-blend of the motions of these two bones. A stiffness is a factor on the corrections of a sweep, as in ``pbd``, so the result depends
-on ``iterations``. All rods have the same radius at rest, chosen so that the rods together have the volume of the muscle. Only the
-rods keep their volume; the volume enclosed by the surface may change.
+neighbouring segment. The solver is quasi-static and has no mass. It advances by one frame number at a time: the initial guess is
+the state at the previous frame number, moved by a blend of the motions of these two bones. A stiffness is a factor on the
+corrections of a sweep, as in ``pbd``, so the result depends on ``iterations``. All rods have the same radius at rest, chosen so
+that the rods together have the volume of the muscle. Only the rods keep their volume; the volume enclosed by the surface may
+change.
 """
 
 from typing import Annotated
@@ -38,7 +39,7 @@ _AROUND, _CARRIERS = 6, 12
 
 
 class ViperSettings(Record):
-    """``points``: number of points of each rod. ``iterations``: number of sweeps over all constraints for each frame number.
+    """``points``: number of points of each rod. ``iterations``: sweeps over all constraints from each frame number to the next.
     ``stretch``, ``bending``, ``volume``, ``bundle``: stiffness of each kind of constraint in a sweep, from 0 (off) to 1.
     ``contact``: if true, each point of a rod stays away from bones by the rod radius (or by its distance at rest, if that is less),
     and the surface is moved out of bones. The default is false.
@@ -194,7 +195,7 @@ class Rods(MovingSurface):
         return Frame(number, self.points.copy(), self.fibres.copy(), scalars=scalars)
 
     def ending(self) -> Outcome:
-        """The outcome "converged": a fixed number of iterations cannot fail to converge."""
+        """The outcome, always "converged": the number of iterations is fixed, and there is no convergence criterion."""
         count, points = self.rest.shape[:2]
         return Outcome("converged", f"{count} rods with {points} points each and a rest radius of {self.radius:.3g} mm")
 
@@ -238,7 +239,7 @@ def _carried(rest: Floats, parts: Floats) -> Floats:
 
 
 def solve(problem: MuscleProblem, settings: ViperSettings, sink: Sink) -> Outcome:
-    """Solve a muscle with VIPER through every frame number."""
+    """Solve a muscle with VIPER, advancing by one frame number at a time."""
     return follow(Rods(problem, settings), problem, sink)
 
 

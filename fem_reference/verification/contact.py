@@ -17,7 +17,8 @@ from fem_reference.verification.parts import SLOW, SYMMETRY, clamped, control, f
 
 MU = 0.01  # [MPa]
 PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL = 10.0, 1.0, 0.5  # [MPa], [MPa/mm], [mm]; the cube has sides of 1 mm
-# Radius of the sphere and distance by which it is pressed in [mm], and bulk modulus of the body [MPa]. The contact radius is 1 mm.
+# Radius of the sphere [mm], distance by which the sphere is pressed into the body [mm], and bulk modulus of the body [MPa]. The
+# contact radius is 1 mm.
 RADIUS, APPROACH, BULK = 10.0, 0.1, 10.0
 # Contact stiffness of the sphere [MPa/mm], and radii of the body and of its finely meshed core [mm].
 BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2
@@ -150,7 +151,7 @@ ENTRIES = (
     *(
         CONTACT(
             name=f"plate_{element.lower().replace('/', '_')}",
-            title=f"A frictionless plate pressed onto a block of {element} elements to about half the height: the force",
+            title=f"A frictionless plate that compresses a block of {element} elements to about half its height: the force",
             unit="N",
             measure=plate,
             given={"element": element, "stiffness": PLATE_STIFFNESS},

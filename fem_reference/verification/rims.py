@@ -74,10 +74,10 @@ CONTROLS = {
     UNIFORM: control("meshes graded towards the rim", grading=GRADED),
     GRADED: control("uniform meshes", grading=UNIFORM),
 }
-PLANE = "the coarsest of the three meshes has 4 cells along each side; on finer meshes the order moves towards the exact order by"
+PLANE = "the coarsest mesh has 4 cells along x and z in each half; on finer meshes the difference from the exact order decreases by"
 ON_PLANE = "Clamped patch in plane strain: order of convergence of the force on the patch, for quadratic hexahedra on"
 ON_BLOCK = "Clamped patch on a block with free ends: order of convergence of the force on the patch, for quadratic hexahedra on"
-SPACE = "the coarsest of the three meshes has 3 cells along each side and one cell along the rim; the ends of the rim add an error"
+SPACE = "the coarsest mesh has 3 cells along x and z in each half and one cell along the rim; the ends of the rim add an error"
 
 ENTRIES = tuple(
     Entry(

@@ -1,9 +1,9 @@
-"""Checks of a state by means over cells: each law is inside its range of validity, and the body has not collapsed.
+"""Checks, based on cell averages, that each law is inside its range of validity and that the body has not collapsed.
 
-The checks use means over cells because the exact strain at the rim of an attachment is unbounded. Det F at a vertex on the rim may
-be far from 1 although the cell has kept its volume. Even the mean over a single cell may be far from 1: in ``gluteus_maximus``,
-with a bulk modulus of a thousand shear moduli, means are as low as 0.37 and as high as 1.9. For such a cell the check reports that
-a law is outside its range, but not that the body has collapsed.
+The checks use averages over cells because the exact strain at the rim of an attachment is unbounded. Det F at a vertex on the rim
+may be far from 1 although the cell has kept its volume. Even the average over a single cell may be far from 1: in
+``gluteus_maximus``, whose bulk modulus is a thousand times its shear modulus, averages are as low as 0.37 and as high as 1.9. For
+such a cell the check reports that a law is outside its range, but not that the body has collapsed.
 """
 
 from collections.abc import Callable, Iterable
@@ -27,8 +27,8 @@ from fem_reference.solvers.fenicsx.meshes import geometry
 # A cell has collapsed if less than the fraction COLLAPSED of its rest volume is left, whatever the ranges of the laws. About four
 # fifths of muscle are water, which does not leave the muscle during a motion (Ward and Lieber 2005, Density and hydration of fresh
 # and fixed human skeletal muscle), and a fifth of the volume would barely contain the solid part. A body has collapsed if collapsed
-# cells make up more than the fraction SHARE of its rest volume. Cells that collapse only at the rim of an attachment make up a
-# smaller fraction, which decreases further on finer meshes.
+# cells make up more than the fraction SHARE of its rest volume. If only cells at the rim of an attachment collapse, they make up
+# a smaller fraction, which decreases further on finer meshes.
 COLLAPSED, SHARE = 0.2, 0.01
 _SCALARS = {"V/V0": "cell_volume_ratio", "fibre stretch": "cell_fibre_stretch"}
 
@@ -113,8 +113,8 @@ class Validity:
     def examine(self, frame: float) -> tuple[dict[str, float], list[Outside]]:
         """Examine the state at ``frame``. Returns scalars by name, and the laws that are outside their ranges.
 
-        The scalars are the minimum and maximum over the cells of each mean, and ``outside_law``, the number of cells in which any
-        law is outside its range.
+        The scalars are, for each measure, the minimum and maximum of its cell means, and ``outside_law``, the number of cells in
+        which any law is outside its range.
         """
         scalars: dict[str, float] = {}
         found: list[Outside] = []
