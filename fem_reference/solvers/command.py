@@ -45,11 +45,10 @@ Value = int | float | str
 class CommandSettings(Record):
     """The command line, and a value for each setting in it.
 
-    ``command``: the command line. ``unit``: the unit of length of the frames, by default the unit in a ``candidate.toml`` next to
-    the frames, otherwise mm. ``version``: the version of the program. ``files``: files and folders that determine the results, in
-    addition to those that the command names. ``moves``: the mesh whose points the program moves. ``time_limit``: the limit on
-    processor time. Available only in Python are ``directory``: the working directory; and ``ladder``: for some settings, values
-    from the fastest to the most accurate.
+    ``unit``: the unit of length of the frames, by default the unit in a ``candidate.toml`` next to the frames, otherwise mm.
+    ``version``: the version of the program. ``files``: files and folders that determine the results, in addition to those that the
+    command names. ``moves``: the mesh whose points the program moves. ``time_limit``: the limit on processor time. In Python only,
+    ``directory``: the working directory; ``ladder``: for some settings, values from the fastest to the most accurate.
     """
 
     model_config = ConfigDict(protected_namespaces=())
