@@ -239,10 +239,7 @@ def cotangents(points: Floats, triangles: Ints) -> Floats:
 def _edge_weights(surface: Surface, name: Weights) -> Any:
     """A sparse matrix (n, n) with two weights for each edge, one for each end."""
     triangles, count = surface.triangles, len(surface.points)
-    one, other = (
-        triangles[:, [1, 2, 0]].ravel(),
-        triangles[:, [2, 0, 1]].ravel(),
-    )  # ends of the edge opposite each corner
+    one, other = triangles[:, [1, 2, 0]].ravel(), triangles[:, [2, 0, 1]].ravel()  # ends of the edge opposite a corner
     ends = (np.concatenate([one, other]), np.concatenate([other, one]))
     halves = np.tile(cotangents(surface.points, triangles).ravel() / 2, 2)
     matrix = sparse.coo_array((halves, ends), shape=(count, count)).tocsr()

@@ -130,9 +130,7 @@ class CollidingBone:
         self.bone, shape = bone, bone.shape
         self.grid = shape if isinstance(shape, Grid) else None
         self.coefficients = np.array(shape.coefficients) if isinstance(shape, Grid) else np.zeros((0, 0, 0))
-        self.known_to = (
-            math.inf if self.grid is None else self.grid.margin
-        )  # larger distances from a grid are inaccurate
+        self.known_to = math.inf if self.grid is None else self.grid.margin  # a grid is coarse at larger distances
         self.asked_at, self.clear = np.array(rest), np.where(free, 0.0, np.inf)
         distance, _ = self._sample(self.asked_at)
         self.allowed = np.minimum(distance, gap)

@@ -77,9 +77,7 @@ class Shortest:
             self.wrong = Trouble("diverged", wrong)
         else:
             points = paths.at(passed.part, passed.share)  # the number of points of each fibre stays the same
-            lost = float(
-                (_lengths(passed, paths) - self.problem.fibres.lengths(points)).max()
-            )  # chords are shorter than arcs
+            lost = float((_lengths(passed, paths) - self.problem.fibres.lengths(points)).max())  # chords are shorter
             try:
                 scalars = {"lost_by_chords_max": lost} | self._forces(passed, paths)
             except InputError as error:  # a line is too short or too long for the muscle model

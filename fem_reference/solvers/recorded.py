@@ -265,9 +265,7 @@ def _welded(soup: Surface, rest: Surface) -> Floats:
     points, found = np.full(rest.points.shape, np.nan), []
     for vertices in (rest.triangles.ravel(), rest.triangles[:, ::-1].ravel()):
         points[vertices] = soup.points
-        gaps = np.linalg.norm(
-            points[vertices] - soup.points, axis=1
-        )  # distances from the last corner at the same vertex
+        gaps = np.linalg.norm(points[vertices] - soup.points, axis=1)  # from the last corner at the same vertex
         found.append((float(gaps.max()), int(vertices[gaps.argmax()]), points.copy()))
     gap, vertex, points = min(found, key=lambda one: one[0])
     if gap > SAME_POINT:

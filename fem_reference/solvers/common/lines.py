@@ -155,7 +155,7 @@ def along(points: Floats, places: list[float]) -> Floats:
 
 @lru_cache(maxsize=64)
 def _layout(sizes: tuple[int, ...], places: tuple[float, ...]) -> tuple[Ints, Floats]:
-    """The ``part`` and ``share`` of :class:`Passed` for fibres of ``sizes`` points, with fixed points at the fractions ``places``."""
+    """The ``part`` and ``share`` of :class:`Passed` for fibres of ``sizes`` points with fixed points at fractions ``places``."""
     part, share = zip(*(_spread(size, list(places)) for size in sizes), strict=True)
     return np.concatenate([found + i * (len(places) - 1) for i, found in enumerate(part)]), np.concatenate(share)
 
