@@ -1,8 +1,8 @@
 """Contact with bones and the springs of attachments in FEBio's input file, and differences between FEBio's model and the reference.
 
 FEBio's ``tied-elastic`` contact applies a traction: the penalty times the change, since rest, of the vector from a point on the
-primary surface to the point on the secondary surface that was nearest at rest. The traction is integrated over the deformed primary
-surface. Here this is a rigid copy of the attached area, whose area does not change. Therefore the contact acts like the springs of
+primary surface to the point on the secondary surface that was nearest at rest. FEBio integrates it over the current primary
+surface, which here is a rigid copy of the attached area, whose area does not change. Therefore the contact acts like the springs of
 an attachment, with a stiffness per unit rest area that is the same in all directions. Springs at points of the surface are
 represented by small rigid triangles at the nearest points of the tetrahedra.
 """

@@ -1,4 +1,4 @@
-"""As-rigid-as-possible (ARAP) deformation of the muscle surface. Report section 5.5.2; Sorkine and Alexa 2007.
+"""Deformation of the muscle surface that is as rigid as possible (ARAP). Report section 5.5.2; Sorkine and Alexa 2007.
 
 The edges around each vertex, its cell, are rotated with as little distortion as possible. At frame number n the bones are in their
 pose of frame n, and attached vertices move exactly with their bone. Starting from the previous state, the method alternates between
