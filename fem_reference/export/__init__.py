@@ -36,8 +36,7 @@ def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: For
 
     The form ``"febio"`` adds FEBio's input file to the open formats, and logs a warning for each difference of FEBio's model. If
     there are several muscles, each has a folder with its name, and there is one input file for all of them. Raises InputError
-    unless the folder is missing or empty, or if FEBio lacks an effect of the case. If writing fails, no partly written folder is
-    left behind.
+    unless the folder is missing or empty, or if FEBio lacks an effect of the case. After a failure no folder is left behind.
     """
     if not isinstance(form, str) or form not in FORMATS:
         raise InputError("form", repr(form), f"one of {', '.join(FORMATS)}")

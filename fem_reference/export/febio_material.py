@@ -77,8 +77,7 @@ def matrix_constants(effects: Sequence[Effect]) -> dict[str, float]:
 
 def fibre_constants(effect: FibrePassive) -> dict[str, float]:
     """The constants [MPa, 1] of FEBio's ``muscle material`` with passive fibres alone: the shear moduli (``g1``, ``g2``, ``g3``)
-    and the activation are 0. FEBio's ``lam_max`` is a stretch relative to rest, ``linear_from`` a stretch relative to the optimal
-    length.
+    and the activation are 0. The stretch ``lam_max`` in FEBio is relative to rest, ``linear_from`` to the optimal length.
     """
     off = {"g1": 0.0, "g2": 0.0, "g3": 0.0, "activation": 0.0}
     toe = {"p1": effect.p1, "p2": effect.p2, "Lofl": effect.optimal_stretch, "smax": effect.stress}

@@ -29,10 +29,9 @@ SCALED: dict[type[Effect], tuple[str, ...]] = {
     FibrePassive: ("stress",),
     FibrePassiveFebio: ("c3", "c5"),
 }
-# Parameters in a part differ by at most FACTOR. Fibre parameters below _LEAST times the maximum are treated as if they had this
-# value.
+# Parameters in a part differ by at most FACTOR. Fibre parameters below _LEAST times the maximum are not distinguished.
 FACTOR, _LEAST = 1.2, 0.01
-# The parameters of fibre effects, which times the share may fall to 0 at the border of a region.
+# The parameters of fibre effects. Multiplied by the share of a region, they may fall to 0 at its border.
 _OF_FIBRES = ("stress", "c3", "c5")
 # The barycentric coordinates of the points of a quadrature rule of degree 2 in a tetrahedron.
 _NEAR, _FAR = (5 + 3 * 5**0.5) / 20, (5 - 5**0.5) / 20
@@ -53,7 +52,10 @@ class Piece:
 
 
 def shares(problem: MuscleProblem) -> dict[str, Floats]:
-    """The mean share (m,) in each tetrahedron of each region, or of the rest outside a region, in which an effect acts; by name."""
+    """The mean share (m,) of each region in each tetrahedron, by the name with which effects refer to the region.
+
+    For effects that act outside a region, the name begins with ``REST`` and the share is 1 minus that of the region.
+    """
     corners, found = problem.mesh.points[problem.mesh.tets], dict[str, Floats]()
     for name in dict.fromkeys(filter(None, map(region_of, problem.effects))):
         points = np.einsum("qc,mci->mqi", _POINTS, corners).reshape(-1, 3)

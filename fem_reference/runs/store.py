@@ -39,10 +39,10 @@ class Frame:
 
     ``surface`` (n, 3), ``fibres`` (m, 3), ``points`` (k, 3) [mm]: positions of the vertices of the surface, of the points of the
     fibres and of the nodes of the mesh. ``forces`` (3,) [N]: the force of each constraint, along its prescribed components, and of
-    each obstacle, by name. If several regions prescribe a component at a node, its force belongs to each of them. ``moments`` (3,)
-    [N mm]: the moments of these forces about the origin. ``state``: the unknowns of the cells, if requested. ``field``: the field
-    of a scalar problem. ``residuals``: the norms [N, mm3] before and after each Newton iteration of the last load step. ``note``: a
-    text that is shown with the progress of the run.
+    each obstacle, by name. If several regions prescribe a component at a node, the force of each includes this node. ``moments``
+    (3,) [N mm]: the moments of these forces about the origin. ``state``: the unknowns of the cells, if requested. ``field``: the
+    field of a scalar problem. ``residuals``: the norms [N, mm3] before and after each Newton iteration of the last load step.
+    ``note``: a text that is shown with the progress of the run.
 
     ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, stored energy [N mm], newton_iterations,
     cut_backs. The reference adds the extremes of means over cells, min_cell_volume_ratio and max_cell_volume_ratio and, if a law

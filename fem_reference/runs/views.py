@@ -1,6 +1,6 @@
 """Frames and runs of a single muscle, extracted from a run of several muscles.
 
-There, the name of a muscle is the prefix of its scalars.
+In a run of several muscles, the scalars of each muscle begin with the name of the muscle.
 """
 
 from collections.abc import Mapping

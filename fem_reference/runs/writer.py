@@ -1,7 +1,7 @@
 """Writing runs to disk while they are solved, one frame after the other.
 
 Files are written atomically, and ``run.json`` is written after the frame files that it names. A stored run with the status
-``running`` was cut off or crashed. It is not read as a result, but it continues if its solver supports this.
+``running`` was cut off or crashed. It is not read as a result, but a solver that supports continuation continues it.
 """
 
 import json
@@ -102,14 +102,14 @@ QUIET = 1.0
 
 
 class Writer:
-    """A writer of a run into ``folder``.
+    """A writer that stores a run in ``folder``.
 
     The folder is emptied first, unless it contains a run that was cut off and can continue. Call ``add`` for each frame, then
     ``close``. A frame whose number is already stored replaces the stored frame and all later frames.
     """
 
     def __init__(self, folder: Path, identity: RunJson, rest: AtRest = NOTHING, *, anew: bool = False) -> None:
-        """Begin a run. ``identity``: the first keys of run.json. ``rest``: shapes at rest. ``anew``: continue no stored run."""
+        """Begin a run. ``identity``: the first keys of run.json. ``rest``: shapes at rest. ``anew``: ignore a stored run."""
         self.folder, self.rest = folder, rest
         self.state: RunJson = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
         self.state |= {"scalars": {}, "residuals": [], "cost": {}, "parts": []}

@@ -65,7 +65,7 @@ def in_table(kind: str | None = None) -> tuple[Candidate, ...]:
 
 
 def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
-    """The name of a run and its solver with settings, for the ``name`` of a candidate or of a solver.
+    """The name of a run, and the solver with its settings, that belong to ``name``, the name of a candidate or of a solver.
 
     The settings are from the candidates of the case; otherwise, for a muscle, from table-5-1; otherwise they are the defaults.
     """

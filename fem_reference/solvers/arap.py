@@ -1,11 +1,11 @@
-"""Deformation of the muscle surface that is as rigid as possible (ARAP). Report section 5.5.2; Sorkine and Alexa 2007.
+"""Muscle surfaces deformed as rigidly as possible (ARAP). Report section 5.5.2; Sorkine and Alexa 2007.
 
-The edges around each vertex, its cell, are rotated with as little distortion as possible. At frame number n the bones are in their
-pose of frame n, and attached vertices move exactly with their bone. Starting from the previous state, the method alternates between
-the rotations of all cells (local step) and the positions of the free vertices (global step). If the rows of attached vertices are
-removed and an edge has the same weight at both ends, each step minimises eq. 5.10 over its unknowns, so the energy never rises.
-This also holds with negative weights, because the matrix is still the positive stiffness matrix of linear elements. Attachments by
-springs are treated as exact, and there is no contact.
+The edges around each vertex form a cell, which is rotated with as little distortion as possible. Frame number n is the state in
+which the bones have their pose of frame n; attached vertices move exactly with their bone. Starting from the previous state, the
+method alternates between the rotations of all cells (local step) and the positions of the free vertices (global step). If the rows
+of attached vertices are removed and an edge has the same weight at both ends, each step minimises eq. 5.10 over its unknowns, so
+the energy never rises. This also holds with negative weights, because the matrix is still the positive stiffness matrix of linear
+elements. Attachments by springs are treated as exact, and there is no contact.
 """
 
 from collections.abc import Callable
@@ -84,8 +84,8 @@ class GlobalStep:
 
     ``pick`` (m, n): the matrix by which both sides are multiplied. It selects the rows of free vertices or, for least squares, is
     the transpose of their columns. ``coupling`` (m, k): ``pick`` times the columns of attached vertices. ``loose``: free vertices
-    that are not connected to an attached vertex by nonzero weights. ``factor``: the LU factors. They are None, and no vertex moves,
-    if there are loose vertices, no attached vertices or no free vertices.
+    that are not connected to an attached vertex by nonzero weights. ``factor``: the LU factors, or None if there are loose
+    vertices, no attached vertices or no free vertices; no vertex moves then.
     """
 
     cells: VertexCells

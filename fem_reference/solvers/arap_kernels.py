@@ -94,7 +94,7 @@ def _rotate(covariance: Floats, matrix: Floats, vectors: Floats, rotation: Float
 
 @compiled
 def fit_rotations(points: Floats, cells: VertexCells) -> Floats:
-    """The rotations (n, 3, 3) of the cells: the least-squares fit of their rotated rest edges to the edges between ``points``.
+    """The rotations (n, 3, 3) that map the edges of each cell at rest to the edges between ``points``, fitted by least squares.
 
     The covariance is ``C = sum_j w_ij (p_i - p_j) (p'_i - p'_j)^T``, in which edges start at the vertex i, as in Sorkine and
     Alexa 2007. With edges from the centroid of the cell, as in the report's text, the fit would not minimise eq. 5.10.

@@ -28,7 +28,7 @@ from fem_reference.solvers.pbd_kernels import volume
 _REACHED, _STEPS = 1e-12, 20
 # A root is taken to be real if its imaginary part is at most this fraction of its magnitude.
 _REAL = 1e-8
-# The volume is preserved if its relative error is at most this.
+# The volume counts as preserved if its relative error is at most this value.
 _KEPT = 1e-6
 
 

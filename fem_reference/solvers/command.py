@@ -36,7 +36,7 @@ from fem_reference.solvers.common.protocol import Moves, MuscleSolver, Trade
 
 _PLACEHOLDER = re.compile(r"\{([A-Za-z]\w*)\}")
 FOLDERS = ("scene", "out")
-REFUSED = 77  # the exit status of a program that does not support a scene, as of skipped tests in Automake
+REFUSED = 77  # the exit status of a program that does not support a scene, as for skipped tests in Automake
 # The code of a separate Python process, which calls a pickled function with the folders.
 _CALL = "import pathlib, pickle, sys; a = [*map(pathlib.Path, sys.argv[1:])]; pickle.loads(a[0].read_bytes())(*a[1:])"
 Value = int | float | str
@@ -192,7 +192,7 @@ def _check_named(key: str, names: tuple[str, ...], place: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class CommandSolver(MuscleSolver[CommandSettings]):
-    """The solver of :class:`CommandSettings`, which adds the settings in the command to this record."""
+    """The solver that runs a command. Its settings are those of :class:`CommandSettings` and those that the command contains."""
 
     def record(self, given: Mapping[str, Any], place: str) -> type[CommandSettings]:
         """The type of the settings, with a required key for each setting in the command; a ladder marks a setting as ``Trade``."""

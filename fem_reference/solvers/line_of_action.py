@@ -1,8 +1,8 @@
 """Lines of action: each fibre of the scene is a line between bones, straight, through via-points or around obstacles.
 
-Report sections 5.1 to 5.3. A line has the ends of the fibre, each fixed to the bone whose attachment is nearest at rest. Between
-fixed points the line is as short as possible. It has a length and, with ``hill``, a force, but no surface, so only length and force
-are judged. At an obstacle the line takes the shorter side. Therefore it switches sides when both sides have become equally long.
+Report sections 5.1 to 5.3. The ends of a line are those of the fibre, each fixed to the bone whose attachment is nearest at rest.
+Between fixed points the line is as short as possible. It has a length and, with ``hill``, a force, but no surface, so only length
+and force are judged. At an obstacle the line takes the shorter side, so it switches sides when both sides are equally long.
 """
 
 from itertools import pairwise
@@ -33,7 +33,7 @@ class LineSettings(Record):
 
     ``via``: the via-points, in order along the fibre. ``via_count``: instead of ``via``, the number of via-points that are spread
     evenly over each fibre, each on the bone of the nearer end. ``obstacle``: surfaces around which a line wraps if the straight
-    path between two fixed points would cross them. ``hill``: the muscle model from which lines have forces.
+    path between two fixed points would cross them. ``hill``: the muscle model that determines the forces of the lines.
     """
 
     via: tuple[Via, ...] = ()

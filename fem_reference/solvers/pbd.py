@@ -32,8 +32,8 @@ _AS_NEAR = 1e-9
 class PbdCollision(Record):
     """Contact of bones with free vertices.
 
-    ``gap`` [mm]: the minimum distance between a vertex and a bone; a vertex that is closer at rest has its distance at rest
-    instead. ``stiffness``: the fraction of the displacement out of a bone that one projection applies.
+    ``gap`` [mm]: the minimum distance between a vertex and a bone; for a vertex that is closer at rest, the minimum is its distance
+    at rest. ``stiffness``: the fraction of the displacement out of a bone that one projection applies.
     """
 
     gap: Annotated[Length, Field(ge=0)]
@@ -45,13 +45,11 @@ class PbdSettings(Record):
 
     ``sub_iterations``: the number of steps of the algorithm in each iteration, 3 in section 6.1 of the report.
     ``solver_iterations``: the number of sweeps over all constraints in each step (line 15). ``damping``: the fraction of each
-    velocity that is lost in a step (line 8). ``stretch``, ``volume``, ``bending``: the stiffness of edge lengths, of the enclosed
-    volume and of dihedral angles. A stiffness is the fraction of an error that one projection removes, from 0 (constraint off) to
-    1.
+    velocity that is lost in a step (line 8). ``stretch``, ``volume``, ``bending``: the stiffness of edge lengths, of the volume and
+    of dihedral angles, that is, the fraction of an error that one projection removes, from 0 (constraint off) to 1.
 
-    ``anisotropy``: the factor a in the stiffness ``stretch (1 - a |cos|)`` of an edge, with the cosine of the angle between the
-    edge and the nearest fibre at rest; a = 1 in the report's program with fibres. ``collision``: contact with bones (lines 12 to
-    14).
+    ``anisotropy``: the factor a in the stiffness ``stretch (1 - a |cos|)`` of an edge, with the cosine of its angle to the nearest
+    fibre at rest; a = 1 in the report's program with fibres. ``collision``: contact with bones (lines 12 to 14).
     """
 
     sub_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10))]
@@ -116,11 +114,9 @@ def hinges_of(triangles: Ints) -> Ints:
 
 
 def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
-    """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre segment that is nearest to the midpoint of the
-    edge.
+    """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre segment nearest to the midpoint of the edge.
 
-    Of segments that are equally near up to rounding, as at a kink, the first is used, so the choice does not change if the scene is
-    rotated.
+    If several segments are equally near up to rounding, as at a kink, the first is used, also in a rotated scene.
     """
     starts = np.setdiff1d(np.arange(len(fibres.points) - 1), fibres.offsets[1:] - 1)
     starts = starts[np.any(fibres.points[starts + 1] != fibres.points[starts], axis=1)]

@@ -147,7 +147,7 @@ def dihedrals(points: Floats, hinges: Ints) -> Floats:
 
 @compiled
 def project_distances(points: Floats, inverse_masses: Floats, edges: Ints, rest: Floats, stiffness: Floats) -> None:
-    """Project the length of each of the ``edges`` (e, 2) towards ``rest`` (e,) [mm]; ``stiffness`` (e,) is that of each edge."""
+    """Project the length of each of the ``edges`` (e, 2) towards ``rest`` (e,) [mm], with the ``stiffness`` (e,) of the edge."""
     for h in range(len(edges)):
         i, j = edges[h, 0], edges[h, 1]
         weight = inverse_masses[i] + inverse_masses[j]
@@ -217,7 +217,7 @@ def project_dihedrals(points: Floats, inverse_masses: Floats, hinges: Ints, rest
 def multiplier_step(value: float, weight: float, softness: float, multiplier: float) -> float:
     """The step ``dl`` of the ``multiplier`` l of a constraint with the ``value`` C; 0 if none of its points can move.
 
-    ``weight``: the sum of w_j |grad_j C|^2. ``softness``: a.
+    ``weight``: the sum of w_j |grad_j C|^2. ``softness``: the value a.
     """
     if weight > 0:
         return -(value + softness * multiplier) / (weight + softness)
@@ -230,7 +230,7 @@ def pull_distances(
 ) -> None:
     """Project the length of each of the ``edges`` (e, 2) once, and update its multiplier.
 
-    ``rest`` (e,) [mm]: lengths at rest. ``softness`` (e,) [1/t]: a of each edge.
+    ``rest`` (e,) [mm]: lengths at rest. ``softness`` (e,) [1/t]: the value a of each edge.
     """
     for h in range(len(edges)):
         i, j = edges[h, 0], edges[h, 1]
@@ -248,7 +248,7 @@ def pull_volume(
 ) -> float:
     """Project six times the volume inside ``triangles`` (m, 3) once. Returns the new multiplier.
 
-    ``rest`` [mm3]: six times the volume at rest. ``softness`` [mm4/t]: a of the constraint.
+    ``rest`` [mm3]: six times the volume at rest. ``softness`` [mm4/t]: the value a.
     """
     value, gradient = volume(points, triangles)
     weight = 0.0
@@ -267,8 +267,8 @@ def pull_dihedrals(
 ) -> None:
     """Project the dihedral angle of each of the ``hinges`` (e, 4) once, and update its multiplier.
 
-    ``rest`` (e,) [rad]: angles at rest. ``softness`` (e,) [1/(t mm2)]: a of each hinge. As in ``project_dihedrals``, one projection
-    changes an angle by at most ``LARGEST_TURN``.
+    ``rest`` (e,) [rad]: angles at rest. ``softness`` (e,) [1/(t mm2)]: the value a of each hinge. As in ``project_dihedrals``, one
+    projection changes an angle by at most ``LARGEST_TURN``.
     """
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]

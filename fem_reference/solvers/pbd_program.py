@@ -22,10 +22,11 @@ The program (github.com/cervenkam/muscle-deformation-PBD) differs from the repor
 Frame number n is the state after iteration n.
 
 The recorded squeezed box is reproduced in all 300 iterations, to the last digit in single precision. This requires the program's
-order of arithmetic operations, so ``pbd`` cannot share its projections. The squeezed box is chaotic: a difference of 1e-15, at rest
-or from the order of a sum, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with the program's flags, among
-them -Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by iteration 50). For the
-same reason the pose of a bone is the product of its motions, and the rest angle of flat pairs has an error of 2e-8 rad.
+order of arithmetic operations, so the projections of ``pbd`` cannot be used here. The squeezed box is chaotic: a difference of
+1e-15, at rest or from the order of a sum, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with the
+program's flags, among them -Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by
+iteration 50). For the same reason the pose of a bone is the product of its motions, and the rest angle of flat pairs has an error
+of 2e-8 rad.
 
 This solver differs from the program in two respects. The scene defines the attached vertices, whereas the program attaches all
 vertices in the voxels of a bone at rest. The direction of a fibre follows its points, whereas the program mixes points of several
@@ -183,7 +184,7 @@ def solve(setup: Setup, settings: ProgramSettings, sink: Sink) -> Outcome:
 
 
 class ProgramSurface(MovingSurface):
-    """A surface with its constraints, the ``velocity`` (n, 3) [mm/s] of its vertices, and bones of voxels."""
+    """A surface with its constraints, the ``velocity`` (n, 3) [mm/s] of its vertices, and ``bones`` that consist of voxels."""
 
     def __init__(self, setup: Setup, settings: ProgramSettings) -> None:
         super().__init__(setup)
@@ -226,7 +227,7 @@ def collided(starts: Floats, goals: Floats, bones: Sequence[VoxelBone]) -> Float
 
 _EXAMPLE = {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64, "anisotropy": 1.0}
 
-# The values in the report's program.
+# The settings of the report's program.
 _TABLE = TableRow("PBD", "pbd_program", {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64})
 SOLVES = (
     MuscleSolver(

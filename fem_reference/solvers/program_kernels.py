@@ -37,7 +37,7 @@ def add_dot(total: float, a: Vector, b: Vector) -> float:
 
 @compiled
 def project_edges(points: Floats, edges: Ints, rest: Floats, stiffness: Floats) -> None:
-    """Move both ends of each of the ``edges`` (e, 2) to correct the fraction ``stiffness`` (e,) of the error of its length.
+    """Move the ends of each of the ``edges`` (e, 2) so that the fraction ``stiffness`` (e,) of the error of its length is removed.
 
     ``rest`` (e,) [mm]: the lengths at rest.
     """

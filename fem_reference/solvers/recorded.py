@@ -58,10 +58,10 @@ class RecordedSettings(Record):
 class About(Record):
     """The contents of ``candidate.toml``.
 
-    ``name``, ``version``: the program that computed the sequence. ``unit``: the unit of length. ``seconds_per_frame``: the time
-    to solve one frame. ``threads``: the number of threads. ``left_out``: the parts of the scene that the program does not model, in
-    words. Standings use the ``group`` of the method, the ``case``, the key ``scene`` from the export, and ``sha256``: the hash of
-    each file by name, which is checked.
+    ``name``, ``version``: the program that computed the sequence. ``unit``: the unit of length. ``seconds_per_frame``: the time to
+    solve one frame. ``threads``: the number of threads. ``left_out``: the parts of the scene that the program does not model, in
+    words. The other keys are for standings. ``group``: the group of the method. ``case``: the case. ``scene``: the key of the
+    scene, which the export states. ``sha256``: the hash of each file by name, which is checked.
     """
 
     name: FileName | None = None

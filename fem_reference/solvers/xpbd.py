@@ -6,8 +6,7 @@ resists changes of volume. In position based dynamics, which has the same constr
 stiffness. In XPBD, too few sweeps make the muscle too soft, and enough sweeps give an implicit Euler step. The equilibrium depends
 on the time step only if directions change within a step. This holds if the sweeps resolve a step, which needs ``sqrt(k / m) dt`` of
 the stiffest edges below about 1, or more sweeps. With the settings for Table 5.1, which use one sweep, this value is 3 (1.1 for
-half of the edges): doubling the sub-steps changes positions of hip_flexion by up to 1.6 mm (mean 0.7 mm), of a displacement of 53
-mm.
+half of the edges): doubling the sub-steps changes positions of hip_flexion by up to 1.6 mm (mean 0.7 mm; displacement 53 mm).
 
 Frame number n is the state after iteration n, ``frame_time`` after the previous frame. Bones move at constant velocity in between.
 """
@@ -35,8 +34,8 @@ from fem_reference.solvers.pbd_kernels import dihedrals, distances, pull_dihedra
 class XpbdCollision(Record):
     """Contact of bones with free vertices.
 
-    ``gap`` [mm]: the distance between a vertex and a bone at which contact begins; a vertex that is closer at rest has its distance
-    at rest instead. ``stiffness`` [MPa/mm]: under a pressure p the surface comes closer by p / stiffness.
+    ``gap`` [mm]: the distance between a vertex and a bone at which contact begins; for a vertex that is closer at rest, contact
+    begins at its distance at rest. ``stiffness`` [MPa/mm]: under a pressure p the surface comes closer by p / stiffness.
     """
 
     gap: Annotated[units.Length, Field(ge=0)]

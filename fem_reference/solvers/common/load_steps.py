@@ -15,8 +15,8 @@ GROWTH = 1.5
 class Attempt:
     """The record of a Newton solve at one load.
 
-    ``status``: the status of the solve, and of the run if it ends here. ``iterations``: their number. ``residuals`` [N, mm3]: the
-    norms before the first iteration and after each iteration. ``detail``: for a failure, a sentence that begins with its subject.
+    ``status``: the status of the solve, and of the run if it ends here. ``iterations``: the number of iterations. ``residuals`` [N,
+    mm3]: the norms before the first iteration and after each. ``detail``: for a failure, a sentence that begins with its subject.
     """
 
     status: Status

@@ -103,8 +103,7 @@ def _kill(process: int) -> None:
 
 
 class _Watch:
-    """A thread that kills a ``process`` if it takes more than ``limit`` [s] of processor time, or ``CLOCK`` times as much clock
-    time.
+    """A thread that kills a ``process`` after ``limit`` [s] of processor time, or after ``CLOCK`` times as much clock time.
 
     ``overran``: the status and the reason if it was killed, otherwise None. ``memory`` [MB]: the maximum peak memory of one of its
     processes. (The peak from ``os.wait4`` is not used, as it includes the memory of the process that starts the program.)

@@ -17,16 +17,14 @@ Moves = Literal["surface", "tetrahedra", "lines", "nothing"]
 
 
 # Solves a problem and passes each requested frame to a sink as soon as it is reached. A physical failure is reported as a status
-# with a sentence, never as an exception, and earlier frames are kept. A scalar field is a single frame, which is NaN after a
-# failure.
+# with a sentence, never as an exception; earlier frames are kept. A scalar field is a single frame, which is NaN after a failure.
 type Solve[P, S: Record] = Callable[[P, S, Sink], Outcome]
 # Continues a run that was cut off, from the last stored frame with a complete state, otherwise from the first frame. The result is
 # that of an uninterrupted run.
 type GoOn[P, S: Record] = Callable[[P, S, Sink, CutOff], Outcome]
 # Raises InputError, with a key inside a given place, if the settings do not suit the effects of a scene.
 type CheckEffects[S: Record] = Callable[[S, tuple[Effect, ...], str], None]
-# Raises InputError, with a key inside a given place, if the settings do not suit the bones, attachments, fibres or boundary of a
-# case.
+# Raises InputError, with a key inside a given place, if the settings do not suit bones, attachments, fibres or boundary of a case.
 type CheckProblem[S: Record] = Callable[[S, Any, str], None]
 
 

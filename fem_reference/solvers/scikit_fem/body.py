@@ -60,7 +60,7 @@ def _check_known(body: Body) -> None:
     if timed:
         raise InputError("effects", ", ".join(timed), "effects without rates, as this solver has no time steps")
     if in_situ.among(body.effects) is not None:
-        want = "effects that leave the body at rest, as this solver balances no tension at rest"
+        want = "effects that leave the body at rest, as this solver does not support tension at rest"
         raise InputError("effects", "in_situ", want)
     if any(isinstance(effect, Load) and effect.stored for effect in body.effects):
         raise InputError("effects", "membrane", "other effects: this solver has no surface energies")
@@ -119,8 +119,7 @@ class March:
     def attempt(self, frame: float) -> Attempt:
         """Solve at ``frame``, starting from the last converged state, which is restored if the attempt fails.
 
-        A state in which det F is not positive at a quadrature point or at a vertex is *inverted*, even if Newton's method
-        converged.
+        A state in which det F is not positive, at a quadrature point or vertex, is *inverted* even if Newton's method converged.
         """
         with np.errstate(all="ignore"):  # a step to values that are not finite fails
             attempt, unknowns = self._newton(frame)
@@ -130,7 +129,7 @@ class March:
         return attempt
 
     def _trouble(self, unknowns: Floats, frame: float) -> Trouble | None:
-        """The trouble with a state in equilibrium, inverted cells or an energy that is not finite; None if there is none."""
+        """The trouble with a state in equilibrium: inverted cells, or an energy that is not finite; None if there is none."""
         smallest = np.min(self.equations.smallest_determinants(unknowns))
         if not smallest > 0:
             return Trouble("inverted", f"det F fell to {smallest:.3g}")

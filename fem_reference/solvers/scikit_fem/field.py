@@ -137,8 +137,7 @@ def _failed(count: int, why: str) -> tuple[Floats, Outcome]:
 def _slope_weights(basis: Any) -> Floats:
     """The weights (m, t, q) by which the values of a linear function at the q quadrature points of a cell give its derivatives.
 
-    The gradient of a quadratic function is linear, so the weights give the Laplacian of this function, which scikit-fem does not
-    offer.
+    The gradient of a quadratic function is linear, so the weights give its Laplacian, which scikit-fem does not offer.
     """
     at_points = np.asarray(basis.global_coordinates()).transpose(1, 0, 2)
     return np.asarray(np.linalg.pinv(at_points - at_points.mean(axis=2, keepdims=True)).transpose(0, 2, 1))
