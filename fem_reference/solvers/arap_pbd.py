@@ -87,8 +87,8 @@ def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest
     """Alternate local and global steps, starting from ``points`` (n, 3) [mm].
 
     With ``volume_constraint``, each iteration ends at the volume of ``rest``. The status is *diverged* if this constraint moves a
-    point farther from the unconstrained minimum than the edge length of a cube of that volume. The cubic then has the wrong root,
-    and only folds of the surface preserve the volume.
+    point farther from the unconstrained minimum than the edge length of a cube of that volume: the volume is then preserved only by
+    folds of the surface, at a wrong root of the cubic.
     """
     count, met, tolerance = 0, False, settings.tolerance
     while count < settings.iterations and not met:

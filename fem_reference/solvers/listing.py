@@ -85,7 +85,7 @@ def fem1d(nodes: Floats, peclet: float) -> Floats:
     """
     steps = np.diff(nodes)
     if len(steps) == 0 or not (steps > 0).all():
-        raise InputError("nodes", "nodes that do not increase", "two or more, each beyond the one before")
+        raise InputError("nodes", "nodes that do not increase", "two or more, in increasing order")
     if not peclet > 0:
         raise InputError("peclet", peclet, "more than zero")
     idel = peclet / steps

@@ -237,7 +237,9 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
     orders = (_strangers(surface.triangles, triangles) for triangles in (rest.triangles, rest.triangles[:, ::-1]))
     other = min(orders, key=np.count_nonzero)
     if other.any():
-        got = f"{np.count_nonzero(other)} triangles of other vertices, the first triangle {other.argmax()}"
+        got = (
+            f"{np.count_nonzero(other)} triangles with other vertices, the first of which is triangle {other.argmax()}"
+        )
         raise InputError(surface.place, got, want)
     return surface.points
 

@@ -43,7 +43,7 @@ class XpbdCollision(Record):
 
 
 class XpbdSettings(Record):
-    """Settings of the method and of the muscle. The keys of the first paragraph are required; the other keys each add an effect.
+    """Settings of the method and of the muscle. The first four keys are required; each of the other keys adds an effect.
 
     ``frame_time`` [s]: the time between two frame numbers in this solver, which replaces the interval of the scene. ``sub_steps``:
     the number of time steps in a ``frame_time``. ``sweeps``: the number of sweeps over all constraints in each time step.

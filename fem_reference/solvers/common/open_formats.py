@@ -85,7 +85,7 @@ def facts(problem: MuscleProblem) -> dict[str, Any]:
         "units": UNITS,
         "conventions": CONVENTIONS,
         "frames": list(problem.frames),
-        "interval": {"value": problem.interval, "unit": "s", "of": "a frame number to the next"},
+        "interval": {"value": problem.interval, "unit": "s", "of": "the time between successive frame numbers"},
         "bones": bones,
         "attachments": [
             {"name": attached.attachment, "bone": attached.bone.name, "stiffness": attached.stiffness, "unit": "MPa/mm"}
