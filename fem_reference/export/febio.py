@@ -172,7 +172,7 @@ def _curve_numbers(problem: MuscleProblem) -> dict[str, int]:
 
 
 def _curves(root: Element, problem: MuscleProblem) -> None:
-    """Add the load curves: number 1 has the times at which FEBio must stop, the others the motion [rad, mm] of each moving bone."""
+    """Add the load curves: curve 1 has the times at which FEBio must stop, each further curve the motion [rad, mm] of a bone."""
     data, (first, *_, last) = SubElement(root, "LoadData"), problem.frames
     _curve(data, 1, "STEP", [(frame - first, _step(problem)) for frame in problem.frames])
     numbers = _curve_numbers(problem)

@@ -81,7 +81,7 @@ def are_kept(folder: Path, frames: tuple[int, ...]) -> bool:
 
 
 def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
-    """The mesh at rest and the fibre directions (m, 3) of the states in the folder of a run; None for a mesh without fibres.
+    """The mesh at rest, and the fibre directions (m, 3) or None without fibres, of the states in the folder of a run.
 
     Raises InputError if the run has no states, or if the file is damaged.
     """

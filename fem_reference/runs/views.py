@@ -28,7 +28,7 @@ _OF_ALL = (
 
 
 def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
-    """The part of a ``frame`` that belongs to one muscle, whose indices are in ``span``.
+    """The part of a ``frame`` of several muscles that belongs to one of them, whose name and indices are in ``span``.
 
     ``others``: the names of the other muscles. A force that another muscle exerts on this muscle has the name of the other muscle.
     """

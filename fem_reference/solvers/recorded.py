@@ -29,8 +29,8 @@ log = logging.getLogger(__name__)
 # The distance [mm] (rms) of the first frame from the rest surface above which there is a warning; rounding in any format is less.
 AT_REST = 0.1
 # The maximum allowed distance, in diagonals of the bounding box of the rest surface: more than solvers move points in their first
-# frame, and less than the effect of a wrong unit (at a tenth of the size, points are at least 0.9 times their rms distance from the
-# centroid away, which is 0.26 diagonals for a sphere).
+# frame, and less than the effect of a wrong unit (at a tenth of the size, the rms distance is at least 0.9 times the rms radius,
+# which is 0.26 diagonals for a sphere).
 NEAR_REST = 0.05
 # The minimum size of a frame relative to rest. No solver shrinks a body so much, but coordinates in m are 1/1000 of those in mm.
 SMALLEST = 1 / 50

@@ -73,7 +73,7 @@ def write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[obj
 
 def facts(problem: MuscleProblem) -> dict[str, Any]:
     """The facts that are not in mesh files: units, conventions, frames, bones, attachments, names of regions, and effects with the
-    unit of each parameter. The shares of regions are in the files with tetrahedra.
+    unit of each parameter. The shares of regions are stored in the files with tetrahedra.
     """
     contact = problem.contact
     bones = [

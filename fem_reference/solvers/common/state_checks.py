@@ -47,8 +47,8 @@ class SurfaceCheck:
     def trouble(self, state: Floats, /) -> Trouble | None:
         """The trouble with positions ``state`` (n, 3) [mm]; None if there is none.
 
-        The surface has *diverged* if a position is not a number, if it is much larger than at rest and than the extent of its
-        attached vertices, or if its volume is much larger than at rest. It is *inverted* if it is turned inside out.
+        The surface has *diverged* if a position is not a number, if the surface is much larger than at rest and than the extent of
+        its attached vertices, or if its volume is much larger than at rest. It is *inverted* if it is turned inside out.
         """
         lost = np.flatnonzero(~np.isfinite(state).all(axis=1))
         if len(lost):
