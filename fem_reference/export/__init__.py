@@ -1,4 +1,4 @@
-"""Export of problems in open formats and for FEBio, and of runs for ParaView; ``solvers.recorded`` reads results back."""
+"""Export of problems in open formats and for FEBio, and of runs for ParaView. ``solvers.recorded`` reads results back."""
 
 import logging
 from collections.abc import Callable
@@ -32,17 +32,18 @@ _NO_DIFFERENCE = "no springs at points of the surface, no bone that overlaps the
 
 
 def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: Format) -> list[str]:
-    """Write the problem that ``build`` makes of a ``case`` into ``folder``, completely or not at all; returns its file names.
+    """Write the problem that ``build`` creates from a ``case`` into ``folder``, and return the names of the files.
 
-    ``"febio"`` adds FEBio's file to the open formats, and warns if FEBio's model differs. Each of several muscles has a folder with
-    its name, and FEBio has one file for all muscles. InputError if the folder is not free, or FEBio lacks an effect of the case.
+    The form ``"febio"`` adds FEBio's input file to the open formats, and logs a warning for each difference of FEBio's model. If
+    there are several muscles, each has a folder with its name, and there is one input file for all of them. Raises InputError
+    unless the folder is missing or empty, or if FEBio lacks an effect of the case. After a failure no folder is left behind.
     """
     if not isinstance(form, str) or form not in FORMATS:
         raise InputError("form", repr(form), f"one of {', '.join(FORMATS)}")
     check(folder)
     for one in _parts(case) if form == "febio" else ():
         febio.check(one)
-    with new_folder(folder) as part:  # created first, so that an error is raised before a problem is built
+    with new_folder(folder) as part:  # created first, so that an error is raised before the problem is built
         problem = build()
         if isinstance(problem, MusclesProblem):
             _write_several(case, problem, part, form)
@@ -72,7 +73,7 @@ def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, more: str) ->
 
 
 def _write_several(case: Case, problem: MusclesProblem, folder: Path, form: Format) -> None:
-    """Write a folder for each muscle, and a text about all of them."""
+    """Write a folder for each muscle, and a README for all of them."""
     for part, (name, one) in zip(_parts(case), problem.problems.items(), strict=True):
         (folder / name).mkdir()
         _write(part.model_copy(update={"name": case.name}), one, folder / name, "")
@@ -86,7 +87,7 @@ def _write_several(case: Case, problem: MusclesProblem, folder: Path, form: Form
 
 
 def _write_febio(case: Case, problem: CaseProblem, folder: Path) -> None:
-    """Write FEBio's file, and a text on the differences of its model."""
+    """Write FEBio's input file, and a text about the differences between FEBio's model and the reference."""
     if isinstance(problem, MusclesProblem):
         differences = febio_several.notes(problem)
         febio.write_model(febio_several.model(problem), folder)

@@ -1,8 +1,8 @@
-"""A problem as FEBio's input file (febio_spec 4.0): quadratic tetrahedra, rigid bones moved by load curves, sliding contact.
+"""A problem as an input file of FEBio (febio_spec 4.0): quadratic tetrahedra, rigid bones moved by load curves, sliding contact.
 
-Based on FEBio's feature manual (febiosoftware/febio-feature-manual) and the sources of FEBio and FEBio Studio that read and write
-these files; FEBio 4.11 was run with exported files. FEBIO.md lists what is identical, and the measured differences. Time is
-the frame number minus the first frame number.
+The format is documented in FEBio's feature manual (febiosoftware/febio-feature-manual) and in the sources of FEBio and FEBio Studio
+that read and write these files. FEBio 4.11 was run with exported files; FEBIO.md lists the identical parts of the models, and the
+measured differences. Time is the frame number minus the first frame number.
 """
 
 from collections.abc import Iterable
@@ -31,16 +31,16 @@ from fem_reference.io import files
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes.muscle import MuscleCase
 
-# The effects that FEBio has in the same form.
+# The effects that FEBio provides in the same form.
 SAME = (NeoHooke, MooneyRivlin, Incompressible, IncompressiblePenalty, FibrePassive, FibrePassiveFebio, Contact)
 LONGEST_STEP = 2.0  # the longest step [frame numbers], as in the runs that FEBIO.md compares
-# Newton's method stops if a correction is below dtol times the displacement increment of the step so far, and its energy is below
-# etol times that of the first iteration of the step. With a dtol of 1e-3 the residual force is 0.4 %.
+# Newton's method stops if the correction is less than dtol times the displacement increment of the step so far, and its energy is
+# less than etol times the energy of the first iteration of the step. With dtol = 1e-3 the residual force would be 0.4 %.
 TOLERANCES = {"dtol": 1e-4, "etol": 1e-5}
 
 
 def check(case: MuscleCase) -> None:
-    """Raise InputError if FEBio lacks an effect of the case, or has it in another form."""
+    """Raise InputError if FEBio lacks an effect of the case in the same form, or has no material for its effects together."""
     for i, effect in enumerate(case.effects):
         if not isinstance(effect, SAME):
             want = f"an effect that FEBio has in the same form: {', '.join(name_of(kind) for kind in SAME)}"
@@ -63,7 +63,7 @@ def write(problem: MuscleProblem, folder: Path) -> None:
 
 
 def write_nodes(problem: MuscleProblem, folder: Path) -> None:
-    """Write ``tet10.csv``, for code that reads FEBio's nodes, into ``folder``."""
+    """Write ``tet10.csv`` into ``folder``, for code that reads node positions from FEBio."""
     _, tets = febio_mesh.quadratic(problem.mesh)
     rows = "".join(",".join(map(str, row)) + "\n" for row in tets.tolist())
     files.write_text(folder / "tet10.csv", ",".join(f"n{i}" for i in range(10)) + "\n" + rows)
@@ -77,18 +77,18 @@ def write_model(root: Element, folder: Path) -> None:
 
 
 def units(first: float) -> str:
-    """The units of a file whose motion begins at the frame ``first``."""
+    """A text with the units in a file whose motion begins at the frame number ``first``."""
     return f"mm, N, MPa; time is the frame number minus {first}"
 
 
 def add_comments(root: Element, texts: Iterable[str]) -> None:
-    """Append each of the ``texts`` as a comment of the file."""
+    """Append each of the ``texts`` to the file as a comment."""
     for text in texts:
         root.append(ElementTree.Comment(f" {text.replace('--', '- -')} "))  # two hyphens would end the comment
 
 
 def model(problem: MuscleProblem) -> Element:
-    """The complete input file."""
+    """The root element of the complete input file of a muscle."""
     root = Element("febio_spec", version="4.0")
     add_comments(root, (units(problem.frames[0]), *notes(problem)))
     SubElement(root, "Module", type="solid")
@@ -105,14 +105,14 @@ def model(problem: MuscleProblem) -> Element:
 
 
 def _control(root: Element, problem: MuscleProblem) -> None:
-    """Add the control of steps, which are at most ``LONGEST_STEP`` long, shorter where FEBio needs it, and end at each frame."""
+    """Add the section ``Control``: steps are at most ``LONGEST_STEP`` long, end at each frame, and are shorter if necessary."""
     control, step = SubElement(root, "Control"), _step(problem)
     steps = round((problem.frames[-1] - problem.frames[0]) / step)
     settings = {"analysis": "STATIC", "time_steps": steps, "step_size": step}
     settings |= {"plot_level": "PLOT_MUST_POINTS", "output_level": "OUTPUT_MUST_POINTS"}
     febio_mesh.leaves(control, settings)
     stepper = SubElement(control, "time_stepper", type="default")
-    retries = {"max_retries": 20, "aggressiveness": 1, "cutback": 0.5}  # each retry has half the step
+    retries = {"max_retries": 20, "aggressiveness": 1, "cutback": 0.5}  # each retry halves the step
     febio_mesh.leaves(stepper, retries | {"opt_iter": 15, "dtmin": step / 200})
     febio_mesh.leaf(stepper, "dtmax", step, lc="1")
     solver = SubElement(control, "solver", type="solid")
@@ -123,13 +123,13 @@ def _control(root: Element, problem: MuscleProblem) -> None:
 
 
 def _step(problem: MuscleProblem) -> float:
-    """The initial and longest step [frame numbers]; a whole number of steps reaches from one requested frame to the next."""
+    """The initial and maximum step [frame numbers]; an integer number of these steps fits between the first two frames."""
     apart = problem.frames[1] - problem.frames[0]
     return apart / ceil(apart / LONGEST_STEP)
 
 
 def _domains(root: Element, problem: MuscleProblem) -> None:
-    """Add the formulation of the muscle's elements; bones, and the copies of areas on which springs pull, are rigid."""
+    """Add the element formulations of the muscle, of the rigid bones, and of the rigid copies of areas with springs."""
     domains = SubElement(root, "MeshDomains")
     mixed = any(isinstance(effect, Incompressible) for effect in problem.effects)
     kind = "three-field-solid" if mixed else "elastic-solid"
@@ -166,13 +166,13 @@ def _motions(root: Element, problem: MuscleProblem) -> None:
 
 
 def _curve_numbers(problem: MuscleProblem) -> dict[str, int]:
-    """The number of the load curve of each bone that moves: from 2 on without gaps, as FEBio uses it as an index into its list."""
+    """The number of the load curve of each bone that moves, by name: 2, 3, ..., as FEBio uses it as an index into a list."""
     moving = [bone.name for bone in problem.bones if bone.motion is not None]
     return {name: number for number, name in enumerate(moving, start=2)}
 
 
 def _curves(root: Element, problem: MuscleProblem) -> None:
-    """Add curve 1 with the times at which FEBio must stop, then for each moving bone a curve of its motion [rad, mm]."""
+    """Add the load curves: curve 1 has the times at which FEBio must stop, each further curve the motion [rad, mm] of a bone."""
     data, (first, *_, last) = SubElement(root, "LoadData"), problem.frames
     _curve(data, 1, "STEP", [(frame - first, _step(problem)) for frame in problem.frames])
     numbers = _curve_numbers(problem)
@@ -194,7 +194,7 @@ def _curve(data: Element, number: int, kind: str, points: list[tuple[float, floa
 
 
 def _output(root: Element) -> None:
-    """Add the output: displacements and stresses for FEBio's viewer, and the muscle's nodes as text."""
+    """Add the section ``Output``: displacement and stress for FEBio Studio, and the nodes of the muscle as text."""
     output = SubElement(root, "Output")
     plot = SubElement(output, "plotfile", type="febio")
     SubElement(plot, "var", type="displacement")

@@ -1,9 +1,10 @@
-"""Contact with bones and springs of attachments in FEBio's input file, and the differences of FEBio's model.
+"""Contact with bones and the springs of attachments in FEBio's input file, and differences between FEBio's model and the reference.
 
-FEBio's ``tied-elastic`` pulls with a traction: its penalty times the vector from a point of the first surface to the point of the
-second surface that was nearest at rest, minus this vector at rest. The traction is integrated over the present first surface, a
-rigid copy of the attached area, which keeps its rest area. So it acts like the springs of an attachment: a stiffness per unit rest
-area, equal in all directions. Springs at surface points are small rigid triangles at the nearest points of the tets.
+FEBio's ``tied-elastic`` contact applies a traction: the penalty times the change, since rest, of the vector from a point on the
+primary surface to the point on the secondary surface that was nearest at rest. FEBio integrates it over the current primary
+surface, which here is a rigid copy of the attached area, whose area does not change. Therefore the contact acts like the springs of
+an attachment, with a stiffness per unit rest area that is the same in all directions. Springs at points of the surface are
+represented by small rigid triangles at the nearest points of the tetrahedra.
 """
 
 from collections.abc import Iterator
@@ -20,30 +21,30 @@ from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices
 
-SEARCH_RADIUS = 5.0  # FEBio looks for contact up to this depth inside a bone [mm]
-# The maximum initial pressure of an overlap at rest, in shear moduli of the matrix. In gluteus_maximus_anatomical a search radius
-# of 5 mm gives up to 34, and FEBio did not complete its first step; a radius of 0.1 mm gives up to 10, and it did.
+SEARCH_RADIUS = 5.0  # the maximum depth inside a bone at which FEBio searches for contact [mm]
+# The maximum initial pressure due to overlap at rest, in shear moduli of the matrix. In gluteus_maximus_anatomical the pressure is
+# up to 34 with a search radius of 5 mm, and FEBio did not complete its first step; with 0.1 mm it is up to 10, and FEBio did.
 _AT_ONCE = 10.0
-SPRING_SEARCH_RADIUS = 1.0  # the search radius of springs [mm], whose two surfaces coincide at rest
-# Contact by penalty alone, in one pass, with the given penalty and the complete tangent.
+SPRING_SEARCH_RADIUS = 1.0  # the search radius for springs [mm], whose two surfaces coincide at rest
+# Contact by penalty without augmentation, in one pass, with the given penalty and the complete tangent.
 PENALTY = {"laugon": 0, "two_pass": 0, "auto_penalty": 0, "symmetric_stiffness": 0}
-# In FEBio 4.11, only springs over facets have been run: the force on the femur differs by 5.3 % on gluteus_medius and 8.8 % on
+# Only springs over facets have been run in FEBio 4.11: the force on the femur differs by 5.3 % in gluteus_medius and by 8.8 % in
 # gluteus_maximus.
 MEASURED = (
     "Springs at points have not been run in FEBio 4.11. In the reference, springs at the nearest points change the force on the "
     "femur by 0.4 % and positions by 0.01 mm (rms; gluteus_medius, frame 20), with 12 mm tetrahedra by 1.2 % and 0.04 mm; springs "
     "over facets change them by 5.8 % and 0.17 mm (FEBio 4.11: 5.3 and 8.8 % of the force, up to 1.1 mm, on two hip muscles)"
 )
-_FELT = 1e-3  # the least overlap at rest that is reported [mm]
+_FELT = 1e-3  # a smaller overlap at rest is not reported [mm]
 
 
 def has_contact(problem: MuscleProblem) -> bool:
-    """True if the file has a section ``Contact``, whose tangent is not symmetric."""
+    """True if the file has a section ``Contact``; the tangent is then not symmetric."""
     return bool(problem.obstacles or febio_mesh.by_springs(problem))
 
 
 def add_contact(root: Element, problem: MuscleProblem) -> None:
-    """Add the section ``Contact``, if something acts between surfaces."""
+    """Add the section ``Contact`` if there are springs or contact with bones."""
     if not has_contact(problem):
         return
     contacts = SubElement(root, "Contact")
@@ -59,19 +60,22 @@ def add_contact(root: Element, problem: MuscleProblem) -> None:
 
 
 def pair(contacts: Element, kind: str, name: str, settings: dict[str, float]) -> None:
-    """Add a contact of a ``kind`` between the surfaces of the pair with this name."""
+    """Add a contact of a ``kind`` between the two surfaces of the pair ``name``."""
     entry = SubElement(contacts, "contact", name=f"{name}_contact", type=kind, surface_pair=f"{name}_pair")
     febio_mesh.leaves(entry, {**PENALTY, **settings})
 
 
 def penalty(problem: MuscleProblem, attached: AttachedVertices) -> float:
-    """The penalty [MPa/mm] of springs: over facets their stiffness; at points a larger value, as the triangles are smaller."""
+    """The penalty [MPa/mm] for springs: their stiffness if they act over facets, divided by ``SHRUNK`` if they act at points."""
     assert attached.stiffness is not None  # the attachment is by springs
     return attached.stiffness / (febio_mesh.SHRUNK if attached.attachment in problem.attached_skins else 1.0)
 
 
 def overlaps(problem: MuscleProblem) -> dict[str, float]:
-    """The maximum depth [mm], at rest, of corners and middles of the contact surface inside each bone in contact; 0 outside."""
+    """The maximum depth [mm] of the contact surface inside each bone at rest, by name; 0 if the surface is outside the bone.
+
+    The depth is evaluated at the corners, the midpoints of edges and the centroids of facets.
+    """
     if not problem.obstacles:
         return {}
     corners = problem.mesh.points[febio_mesh.free_facets(problem)]
@@ -82,8 +86,9 @@ def overlaps(problem: MuscleProblem) -> dict[str, float]:
 
 
 def search_radius(problem: MuscleProblem, deep: float) -> float:
-    """Depth [mm] inside a bone to which FEBio looks for contact, if the muscle penetrates the bone by ``deep`` [mm] at rest. It is
-    smaller if contact would press at once with more than ``_AT_ONCE`` shear moduli of the matrix.
+    """The maximum depth [mm] at which FEBio searches for contact with a bone that the muscle penetrates by ``deep`` [mm] at rest.
+
+    It is smaller than ``SEARCH_RADIUS`` if the initial pressure would exceed ``_AT_ONCE`` shear moduli of the matrix.
     """
     assert problem.contact is not None  # called only with contact
     softest = min(sum(matrix_constants(part.effects)[key] for key in ("c1", "c2")) for part in parts(problem))
@@ -92,15 +97,15 @@ def search_radius(problem: MuscleProblem, deep: float) -> float:
 
 
 def notes(problem: MuscleProblem) -> list[str]:
-    """Differences of the model in FEBio, in sentences with their numbers: regions, springs at points, bones that overlap."""
-    # Springs that act over facets in the reference too are the same in FEBio.
+    """Sentences, with values, about the differences of FEBio's model: regions, springs at points, bones that overlap at rest."""
+    # Springs that act over facets in the reference act in the same way in FEBio.
     on_skins = [one for one in febio_mesh.by_springs(problem) if one.attachment in problem.attached_skins]
     springs = [*(_springs(problem, one) for one in on_skins), *([MEASURED] if on_skins else [])]
     return [*febio_regions.note(problem), *springs, *_overlapping(problem)]
 
 
 def _springs(problem: MuscleProblem, attached: AttachedVertices) -> str:
-    """The distance between the springs of FEBio and of the reference, and their stiffness in total and against rotation."""
+    """A sentence about springs in FEBio and in the reference: their distance, and their stiffness in total and against rotation."""
     skin, found = problem.attached_skins[attached.attachment], febio_mesh.spring_points(problem, attached)
     points, areas = found.points, corner_areas(found.corners) / febio_mesh.SHRUNK
     assert attached.stiffness is not None  # the attachment is by springs

@@ -1,4 +1,4 @@
-"""The materials of FEBio's input file: the sum of the muscle's effects, the axes of its fibres, the rigid bones."""
+"""Materials in FEBio's input file: the effects of the muscle, the axes of its fibres, and rigid bones."""
 
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement
@@ -16,11 +16,11 @@ from fem_reference.export.febio_mesh import bone_id, leaf, leaves, vector
 from fem_reference.export.febio_regions import Piece, parts
 from fem_reference.problems.muscle import MuscleProblem
 
-VOLUME_LAW = 2  # FEBio's pressure_model whose energy is K/2 (J - 1)^2
+VOLUME_LAW = 2  # FEBio's pressure_model with the energy K/2 (J - 1)^2
 
 
 def add_materials(root: Element, problem: MuscleProblem) -> None:
-    """Add the materials of the parts of the muscle, numbered from 1, and a rigid material for each bone."""
+    """Add a material for each part of the muscle, numbered from 1, and then a rigid material for each bone."""
     materials, own = SubElement(root, "Material"), parts(problem)
     for number, part in enumerate(own, start=1):
         _muscle(materials, number, part)
@@ -32,7 +32,7 @@ def add_materials(root: Element, problem: MuscleProblem) -> None:
 
 
 def _muscle(materials: Element, number: int, part: Piece) -> None:
-    """Add one material if FEBio has one for all effects; with ``fibre_passive`` add a mixture: FEBio sums its stresses."""
+    """Add the material of a part: a mixture, whose stresses FEBio sums, if there is ``fibre_passive``, otherwise a single law."""
     matrix, volume = matrix_constants(part.effects), volume_constants(part.effects)
     kind = "trans iso Mooney-Rivlin" if "c3" in matrix else "Mooney-Rivlin"
     passive = [effect for effect in part.effects if isinstance(effect, FibrePassive)]
@@ -48,20 +48,20 @@ def _muscle(materials: Element, number: int, part: Piece) -> None:
 
 
 def _leaves(parent: Element, constants: dict[str, float]) -> None:
-    """Add the constants of a material; if it has fibres (``lam_max``), also their direction: the first axis of each element."""
+    """Add the constants of a material. If it has fibres (``lam_max``), their direction is the first axis of each element."""
     leaves(parent, constants)
     if "lam_max" in constants:
         leaf(SubElement(parent, "fiber", type="vector"), "vector", "1,0,0")
 
 
 def volume_constants(effects: Sequence[Effect]) -> dict[str, float]:
-    """FEBio's law of the volume change and its bulk modulus [MPa]."""
+    """The constants of the volumetric part: FEBio's law and the bulk modulus [MPa]."""
     bulk = sum(effect.bulk for effect in effects if isinstance(effect, Incompressible | IncompressiblePenalty))
     return {"pressure_model": VOLUME_LAW, "k": bulk}
 
 
 def matrix_constants(effects: Sequence[Effect]) -> dict[str, float]:
-    """The constants [MPa, 1] of FEBio's ``Mooney-Rivlin``, or with ``fibre_passive_febio`` of ``trans iso Mooney-Rivlin``."""
+    """The constants [MPa, 1] of FEBio's ``Mooney-Rivlin`` or, with ``fibre_passive_febio``, of ``trans iso Mooney-Rivlin``."""
     found = {"c1": 0.0, "c2": 0.0}
     for effect in effects:
         if isinstance(effect, NeoHooke):
@@ -76,8 +76,8 @@ def matrix_constants(effects: Sequence[Effect]) -> dict[str, float]:
 
 
 def fibre_constants(effect: FibrePassive) -> dict[str, float]:
-    """The constants [MPa, 1] of FEBio's ``muscle material`` that leave only its passive fibres: no shear moduli (``g1``, ``g2``,
-    ``g3``), no activation. FEBio's ``lam_max`` is a stretch relative to rest; ``linear_from`` is relative to the optimal length.
+    """The constants [MPa, 1] of FEBio's ``muscle material`` with passive fibres alone: the shear moduli (``g1``, ``g2``, ``g3``)
+    and the activation are 0. The stretch ``lam_max`` in FEBio is relative to rest, ``linear_from`` to the optimal length.
     """
     off = {"g1": 0.0, "g2": 0.0, "g3": 0.0, "activation": 0.0}
     toe = {"p1": effect.p1, "p2": effect.p2, "Lofl": effect.optimal_stretch, "smax": effect.stress}
@@ -85,7 +85,7 @@ def fibre_constants(effect: FibrePassive) -> dict[str, float]:
 
 
 def add_fibres(root: Element, problem: MuscleProblem) -> None:
-    """Add the axes of each element: the first along the fibre, the second in any direction across it."""
+    """Add the material axes of each element: the first along the fibre, the second in some direction perpendicular to it."""
     if problem.directions is None:
         return
     section = SubElement(root, "MeshData")

@@ -1,4 +1,4 @@
-"""The nodes, elements, node sets and surfaces of FEBio's input file."""
+"""Nodes, elements, node sets and surfaces in FEBio's input file."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
@@ -22,44 +22,44 @@ from fem_reference.geometry.distance import distances
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone
 
-# The pairs of corners between which the mid-side nodes of a tet10 lie; the first three pairs are also the pairs of a tri6.
+# The pairs of corners between which the mid-side nodes of a tet10 are; the first three pairs are also those of a tri6.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
-FACING = [0, 2, 1, 5, 4, 3]  # the nodes of a tri6 whose normal is reversed
-# Springs at points are small rigid triangles of this fraction of the points' tributary areas, by which their penalty is divided.
+FACING = [0, 2, 1, 5, 4, 3]  # the order of the nodes of a tri6 that reverses its normal
+# Springs at points are small rigid triangles. SHRUNK is their area divided by that of the point; the penalty is divided by it too.
 SHRUNK = 0.01
-_LEAST_AREA = 1e-6  # a point with less than this fraction of the largest area has no spring
-_CLEAR = 0.005  # barycentric distance of these triangles from the edges of their facet, so that no ray misses it
+_LEAST_AREA = 1e-6  # a point has no spring if its area is less than this fraction of the largest area
+_CLEAR = 0.005  # the barycentric distance of these triangles from the edges of a facet, so that no ray misses the facet
 
 
 def leaf(parent: Element, tag: str, text: object, **attributes: str) -> None:
-    """Add an element with a text and nothing below it."""
+    """Add an XML element that contains only a text."""
     SubElement(parent, tag, attributes).text = str(text)
 
 
 def leaves(parent: Element, values: Mapping[str, object]) -> None:
-    """Add elements by tag, with the ``values`` as their texts."""
+    """Add an XML element for each tag in ``values``, with the value as its text."""
     for tag, value in values.items():
         leaf(parent, tag, value)
 
 
 def rows(parent: Element, tag: str, values: Iterable[Sequence[float]], first: int = 1) -> None:
-    """Add elements of one ``tag``, numbered from ``first`` on, with all digits of their ``values``."""
+    """Add XML elements with the same ``tag`` and the numbers ``first``, ``first + 1``, ..., with all digits of their ``values``."""
     for number, row in enumerate(values, start=first):
         leaf(parent, tag, ",".join(map(repr, row)), id=str(number))
 
 
 def vector(values: Iterable[float]) -> str:
-    """Numbers with all their digits, as FEBio reads them."""
+    """The text of a list of numbers in FEBio's format, with all digits."""
     return ",".join(repr(float(value)) for value in values)
 
 
 def bone_id(bone: Bone) -> str:
-    """The name of a bone in the file, of its material and of its elements."""
+    """The name of a bone in the file, which is also the name of its material and of its elements."""
     return f"bone_{bone.name}"
 
 
 def springs_id(attached: AttachedVertices) -> str:
-    """The name of the springs of an attachment in the file, of their shells on the bone and of their surfaces."""
+    """The name of the springs of an attachment in the file, with which the names of their shells and surfaces begin."""
     return f"springs_{attached.attachment}"
 
 
@@ -69,12 +69,15 @@ def by_springs(problem: MuscleProblem) -> list[AttachedVertices]:
 
 
 def exactly(problem: MuscleProblem) -> list[AttachedVertices]:
-    """The attachments whose nodes move with their bone."""
+    """The attachments whose nodes move exactly with their bone."""
     return [attached for attached in problem.attached if attached.stiffness is None]
 
 
 def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
-    """Points (n, 3) [mm] and tets (k, 10) with a node in the middle of each edge, in FEBio's order; corners stay as they are."""
+    """The points (n, 3) [mm] and tetrahedra (k, 10) of a mesh with an additional node at the midpoint of each edge.
+
+    Nodes are in FEBio's order, and corners keep their indices.
+    """
     ends = np.sort(mesh.tets[:, EDGES].reshape(-1, 2), axis=1)
     edges, number = np.unique(ends, axis=0, return_inverse=True)
     middles = len(mesh.points) + number.reshape(-1, len(EDGES))
@@ -82,13 +85,16 @@ def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
 
 
 def outward(surface: Surface) -> Surface:
-    """The surface with outward normals."""
+    """The ``surface`` with outward normals."""
     turned = enclosed_volume(surface.points, surface.triangles) < 0
     return Surface(surface.points, surface.triangles[:, ::-1]) if turned else surface
 
 
 def free_facets(problem: MuscleProblem) -> Ints:
-    """The facets (m, 3) of tets in contact: not attached, with a centroid that is not exempt; InputError if there are none."""
+    """The facets (m, 3) of the contact surface: those on the boundary that are not attached and whose centroid is not exempt.
+
+    Raises InputError if there are none.
+    """
     outer, _ = boundary(problem.mesh.tets)
     attached = np.concatenate([np.zeros((0, 3), np.int64), *problem.mesh.facets.values()])
     loose = outer[~found_in(outer, attached)]
@@ -102,8 +108,11 @@ def free_facets(problem: MuscleProblem) -> Ints:
 
 
 class SpringPoints(NamedTuple):
-    """Points of springs on the tetrahedra. ``of`` (n,): the points of the attached skin. ``points`` (n, 3) [mm]: their nearest
-    points on boundary ``facets`` (n, 3). ``corners`` (n, 3, 3) [mm]: small triangles around ``points`` that face the attached skin.
+    """The points of the tetrahedra at which springs act.
+
+    ``of`` (n,): the indices of points on the attached skin. ``points`` (n, 3) [mm]: the nearest points on the boundary of the mesh.
+    ``facets`` (n, 3): the facets that contain them. ``corners`` (n, 3, 3) [mm]: small triangles around the points, which face the
+    attached skin.
     """
 
     of: Ints
@@ -113,8 +122,10 @@ class SpringPoints(NamedTuple):
 
 
 def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringPoints:
-    """The points of springs that act at points of the muscle's surface. ``tied-elastic`` subtracts the gap at rest, so a triangle
-    whose area is the fraction ``SHRUNK`` of a point's tributary area, in the plane of its facet, acts as a spring at this point.
+    """The points of the tetrahedra at which the springs of an attachment act, for springs at points of the surface.
+
+    FEBio's ``tied-elastic`` subtracts the gap at rest. Therefore a triangle in the plane of a facet acts as a spring at a point, if
+    its area is the fraction ``SHRUNK`` of the area of the point.
     """
     skin, outer = problem.attached_skins[attached.attachment], boundary(problem.mesh.tets)[0]
     of = np.flatnonzero(skin.areas > _LEAST_AREA * skin.areas.max(initial=0.0))
@@ -122,7 +133,7 @@ def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringP
     corners = problem.mesh.points[outer[near.triangle]]
     scale = np.sqrt(SHRUNK * skin.areas[of] / corner_areas(corners))[:, None]
     least = scale / 3 + _CLEAR
-    more = np.maximum(near.barycentric - least, 0.0)  # the parts above the least fraction, which are scaled below
+    more = np.maximum(near.barycentric - least, 0.0)  # the parts above ``least``, which are scaled below
     inside = least + more * (1 - 3 * least) / more.sum(axis=1, keepdims=True)
     points = np.einsum("nc,nci->ni", inside, corners)
     small = points[:, None] + scale[:, :, None] * (corners - corners.mean(axis=1, keepdims=True))
@@ -130,7 +141,7 @@ def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringP
 
 
 class Mesh:
-    """Nodes, elements, node sets and surfaces; node numbers of FEBio begin at 1, with the nodes of the muscle."""
+    """Nodes, elements, node sets and surfaces of a problem. Nodes are numbered from 1, beginning with those of the muscle."""
 
     def __init__(self, problem: MuscleProblem) -> None:
         self.problem = problem
@@ -140,7 +151,7 @@ class Mesh:
         self.outer, _ = boundary(problem.mesh.tets)
 
     def add_to(self, root: Element) -> None:
-        """Add the section ``Mesh``, with sets and surfaces after all nodes and elements."""
+        """Add the section ``Mesh``, in which node sets and surfaces follow all nodes and elements."""
         mesh, groups = SubElement(root, "Mesh"), [(MUSCLE, "tet10", self.points, self.tets)]
         for bone in self.problem.bones:
             surface = outward(bone.surface)
@@ -162,20 +173,20 @@ class Mesh:
             self._tied(mesh, attached, cells[springs_id(attached)])
 
     def curved(self, facets: Ints) -> Ints:
-        """Straight triangles (m, 3) of the tets with their mid-side nodes, (m, 6)."""
+        """The triangles (m, 6) with mid-side nodes for ``facets`` (m, 3) of the tetrahedra."""
         ends = np.sort(facets[:, EDGES[:3]], axis=2).reshape(-1, 2).tolist()
         middles = [self.middles[a, b] for a, b in ends]
         return np.hstack([facets, np.reshape(np.array(middles, np.int64), (-1, 3))])
 
     def _area(self, attached: AttachedVertices) -> Ints:
-        """The triangles (m, 6) of an attachment, facing outwards; for springs at points, the triangles with such points."""
+        """The triangles (m, 6) of an attachment, with outward normals; for springs at points, the triangles that contain points."""
         if attached.attachment in self.problem.attached_skins:
             return self.curved(np.unique(spring_points(self.problem, attached).facets, axis=0))
         return self.curved(self.outer[found_in(self.outer, self.problem.mesh.facets[attached.attachment])])
 
     def _copy(self, attached: AttachedVertices) -> tuple[str, Floats, Ints]:
-        """Kind, points (n, 3) [mm] and triangles that coincide with the attached area, or with parts of it about the points of
-        springs, and face it, as FEBio's pairs must.
+        """The kind, the points (n, 3) [mm] and the triangles of a copy of the attached area, which faces this area, as the surfaces
+        of a pair in FEBio must. For springs at points, the copy consists of the small triangles around these points.
         """
         if attached.attachment in self.problem.attached_skins:
             corners = spring_points(self.problem, attached).corners.reshape(-1, 3)
@@ -192,7 +203,7 @@ class Mesh:
             SubElement(mesh, "NodeSet", name=name).text = ",".join(str(node + 1) for node in sorted(nodes))
 
     def _contact_surface(self, mesh: Element, cells: dict[str, Ints]) -> None:
-        """Add the contact surface, and its pairs with the bones."""
+        """Add the contact surface of the muscle, the surfaces of the bones in contact, and the pairs of surfaces."""
         self.surface(mesh, "muscle_free", "tri6", self.curved(free_facets(self.problem)))
         names = [bone_id(bone) for bone in self.problem.obstacles]
         for name in names:
@@ -201,7 +212,7 @@ class Mesh:
             self.pair(mesh, f"{name}_pair", "muscle_free", f"{name}_surface")
 
     def _tied(self, mesh: Element, attached: AttachedVertices, copy: Ints) -> None:
-        """Add the attached area, and its rigid copy as the primary surface, over which FEBio integrates."""
+        """Add the attached area and its rigid copy, which is the primary surface, over which FEBio integrates."""
         name = springs_id(attached)
         self.surface(mesh, f"{name}_muscle", "tri6", self._area(attached))
         self.surface(mesh, f"{name}_bone", f"tri{copy.shape[1]}", copy)
@@ -209,10 +220,10 @@ class Mesh:
 
     @staticmethod
     def surface(mesh: Element, name: str, kind: str, facets: Ints) -> None:
-        """Add a surface with this ``name`` of ``facets`` (m, 3 or 6) of a ``kind``, whose nodes are numbered from 0."""
+        """Add a surface with a ``name`` and ``facets`` (m, 3 or 6) of a ``kind``, whose nodes are numbered from 0."""
         rows(SubElement(mesh, "Surface", name=name), kind, (facets + 1).tolist())
 
     @staticmethod
     def pair(mesh: Element, name: str, primary: str, secondary: str) -> None:
-        """Add a pair of surfaces by their names."""
+        """Add the pair ``name`` of two surfaces, which are given by their names."""
         leaves(SubElement(mesh, "SurfacePair", name=name), {"primary": primary, "secondary": secondary})

@@ -1,6 +1,6 @@
-"""Regions in FEBio's input file: tetrahedra with nearly the same parameters form a part with one material.
+"""Regions in FEBio's input file: tetrahedra with similar parameters form a part with a single material.
 
-The bulk modulus of an uncoupled material in FEBio is one number, so a map of element data cannot represent a region.
+In FEBio the bulk modulus of an uncoupled material is constant, so a region cannot be represented by a map over elements.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from fem_reference.foundations.mesh import Floats, Ints, tet_volumes
 from fem_reference.problems.muscle import MuscleProblem
 
 MUSCLE = "muscle"  # the name of a muscle's elements and material; with regions, the names of its parts begin with it
-# The parameters to which an energy is proportional.
+# The parameters to which the energy of each effect is proportional.
 SCALED: dict[type[Effect], tuple[str, ...]] = {
     NeoHooke: ("mu",),
     MooneyRivlin: ("c1", "c2"),
@@ -29,18 +29,22 @@ SCALED: dict[type[Effect], tuple[str, ...]] = {
     FibrePassive: ("stress",),
     FibrePassiveFebio: ("c3", "c5"),
 }
-# Parameters in a part differ by at most FACTOR; fibre parameters below _LEAST times the maximum count as this bound.
+# Parameters in a part differ by at most FACTOR. Fibre parameters below _LEAST times the maximum are not distinguished.
 FACTOR, _LEAST = 1.2, 0.01
-# Parameters of fibre effects; their share may fall to 0 at the border of a region.
+# The parameters of fibre effects. Multiplied by the share of a region, they may fall to 0 at its border.
 _OF_FIBRES = ("stress", "c3", "c5")
-# The points of a quadrature of degree 2 in a tetrahedron, in barycentric coordinates.
+# The barycentric coordinates of the points of a quadrature rule of degree 2 in a tetrahedron.
 _NEAR, _FAR = (5 + 3 * 5**0.5) / 20, (5 - 5**0.5) / 20
 _POINTS = np.full((4, 4), _FAR) + (_NEAR - _FAR) * np.eye(4)
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """The tetrahedra ``cells`` (k,) of one material, its ``name``, and its ``effects``, each times its mean share in them."""
+    """A part of the muscle with a single material.
+
+    ``name``: the name of the material. ``cells`` (k,): the tetrahedra. ``effects``: the effects, each multiplied by the mean share
+    of its region in these tetrahedra.
+    """
 
     name: str
     cells: Ints
@@ -48,7 +52,10 @@ class Piece:
 
 
 def shares(problem: MuscleProblem) -> dict[str, Floats]:
-    """The mean share (m,) of each tetrahedron in each region that an effect names, and outside of it."""
+    """The mean share (m,) of each region in each tetrahedron, by the name with which effects refer to the region.
+
+    For effects that act outside a region, the name begins with ``REST`` and the share is 1 minus that of the region.
+    """
     corners, found = problem.mesh.points[problem.mesh.tets], dict[str, Floats]()
     for name in dict.fromkeys(filter(None, map(region_of, problem.effects))):
         points = np.einsum("qc,mci->mqi", _POINTS, corners).reshape(-1, 3)
@@ -59,7 +66,7 @@ def shares(problem: MuscleProblem) -> dict[str, Floats]:
 
 @lru_cache(maxsize=8)
 def parts(problem: MuscleProblem) -> tuple[Piece, ...]:
-    """The parts of a muscle, the largest first; a single part if no effect has a region."""
+    """The parts of a muscle, in order of decreasing number of tetrahedra; a single part if no effect has a region."""
     known = shares(problem)
     if not known:
         return (Piece(MUSCLE, np.arange(len(problem.mesh.tets)), problem.effects),)
@@ -75,7 +82,10 @@ def parts(problem: MuscleProblem) -> tuple[Piece, ...]:
 
 
 def _parameters(problem: MuscleProblem, known: dict[str, Floats]) -> list[tuple[str, Floats]]:
-    """The parameters (m,) of each tetrahedron by key: sums over the effects of a kind, but each ``fibre_passive`` by itself."""
+    """The parameters of effects, times shares: pairs of a key and the values (m,) in all tetrahedra.
+
+    A parameter is the sum over all effects of the same kind, except that each ``fibre_passive`` is separate.
+    """
     found = dict[tuple[object, str], Floats]()
     for i, effect in enumerate(problem.effects):
         for key in SCALED.get(type(effect), ()):
@@ -86,13 +96,13 @@ def _parameters(problem: MuscleProblem, known: dict[str, Floats]) -> list[tuple[
 
 
 def _levels(key: str, values: Floats) -> Ints:
-    """The number (m,) of the interval to which each of the ``values`` (m,) of a parameter belongs."""
+    """The number (m,) of the interval that contains each of the ``values`` (m,) of the parameter ``key``."""
     least = max(_LEAST * float(values.max()) if key in _OF_FIBRES else 0.0, np.finfo(float).tiny)
     return np.asarray(np.round(np.log(np.maximum(values, least)) / np.log(FACTOR)), np.int64)
 
 
 def _scaled(effect: Effect, share: float) -> Effect | None:
-    """The ``effect`` times its ``share``; None if the share is 0."""
+    """The ``effect`` multiplied by ``share``; None if the share is 0."""
     keys = SCALED.get(type(effect), ())
     if share <= 0 and keys:
         return None
@@ -100,7 +110,7 @@ def _scaled(effect: Effect, share: float) -> Effect | None:
 
 
 def note(problem: MuscleProblem) -> list[str]:
-    """A sentence on the parts, if there are regions."""
+    """A list with a sentence about the parts; empty if there is only one part."""
     many = len(parts(problem))
     text = (
         f"regions are represented by {many} materials; in each, the parameters of the tetrahedra differ by at most a factor of "

@@ -1,4 +1,4 @@
-"""Several muscles as one input file of FEBio: the model of each muscle, with its own bones, and contact between the muscles."""
+"""Several muscles in one input file of FEBio: the model of each muscle with its bones, and contact between the muscles."""
 
 from xml.etree.ElementTree import Element
 
@@ -6,19 +6,19 @@ from fem_reference.export import febio, febio_contact, febio_mesh
 from fem_reference.geometry.interpenetration import penetration, skin_of
 from fem_reference.problems.muscles import MusclesProblem
 
-# Attributes, and tags with text, that name or refer to something.
+# The attributes that contain names, and the tags whose text is a name.
 _ATTRIBUTES = ("name", "mat", "node_set", "elem_set", "surface_pair")
 _TEXTS = ("primary", "secondary", "rb")
-# Entries that are numbered over all muscles, and entries whose text consists of node numbers.
+# The entries that are numbered over all muscles, with the kind of number, and the entries whose text consists of node numbers.
 _NUMBERED = {"node": "node", "elem": "elem", "material": "material", "load_controller": "curve"}
 _OF_NODES = ("elem", "tri3", "tri6", "NodeSet")
-_ONCE = ("Module", "Control")  # sections that are the same for all
+_ONCE = ("Module", "Control")  # sections that are the same for all muscles
 _ORDER = (*_ONCE, "Material", "Mesh", "MeshDomains", "MeshData", "Boundary", "Rigid", "Contact", "LoadData", "Output")
-_FIRST = ("Nodes", "Elements")  # the entries that come first in a mesh
+_FIRST = ("Nodes", "Elements")  # the entries that must precede all others in a mesh
 
 
 def model(problem: MusclesProblem) -> Element:
-    """The complete input file; all names of a muscle begin with the name of the muscle, as in ``deep_muscle``."""
+    """The root element of the complete input file. Names begin with the name of the muscle, as in ``deep_muscle``."""
     root = Element("febio_spec", version="4.0")
     sections = {tag: Element(tag) for tag in _ORDER}
     before = dict.fromkeys(_NUMBERED.values(), 0)
@@ -28,7 +28,7 @@ def model(problem: MusclesProblem) -> Element:
         mesh.surface(_found(own, "Mesh"), "touching", "tri6", mesh.curved(one.body.mesh.facets["free"]))
         _renamed(own, name, before)
         for section in own:
-            if section.tag in sections:  # comments, for all muscles together, are added below
+            if section.tag in sections:  # the comments for all muscles are added below
                 _add(sections[section.tag], section)
     first = next(iter(problem.problems.values()))
     febio.add_comments(root, (febio.units(first.frames[0]), *notes(problem)))
@@ -39,14 +39,14 @@ def model(problem: MusclesProblem) -> Element:
 
 
 def _found(root: Element, tag: str) -> Element:
-    """The entry with a ``tag``, which must exist."""
+    """The first entry with this ``tag``, which must exist."""
     found = root.find(tag)
     assert found is not None
     return found
 
 
 def _add(known: Element, more: Element) -> None:
-    """Add the entries of a section of another muscle; from its output section only the logged data."""
+    """Add the entries of the section ``more`` of another muscle to ``known``; of an output section, only the logged data."""
     if known.tag in _ONCE and (len(known) or known.attrib):
         return
     known.attrib |= more.attrib
@@ -57,7 +57,10 @@ def _add(known: Element, more: Element) -> None:
 
 
 def _renamed(root: Element, name: str, before: dict[str, int]) -> None:
-    """Put the ``name`` of a muscle before all its names, and continue the numbers from ``before``, which are updated."""
+    """Prefix all names in the model of a muscle with its ``name``, and renumber its entries.
+
+    ``before``: the highest numbers of the preceding muscles, by kind, which are updated.
+    """
     most = dict(before)
     for entry in root.iter():
         for key in set(_ATTRIBUTES) & set(entry.keys()):
@@ -79,7 +82,7 @@ def _renamed(root: Element, name: str, before: dict[str, int]) -> None:
 
 
 def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
-    """Add contact between each pair of muscles that may touch, in two passes with half the stiffness, as in the reference."""
+    """Add contact between each pair of muscles that may touch, in two passes with half of the stiffness, as in the reference."""
     if not problem.pairs:
         return
     assert problem.law is not None  # as muscles touch only by a law
@@ -95,7 +98,7 @@ def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
 
 
 def notes(problem: MusclesProblem) -> list[str]:
-    """Differences of the model in FEBio, by muscle, and of the contact between muscles."""
+    """Sentences about the differences of FEBio's model, for each muscle and for contact between muscles."""
     own = [f"{name}: {text}" for name, one in problem.problems.items() for text in febio_contact.notes(one)]
     between = list[str]()
     for one, other in problem.pairs:

@@ -1,4 +1,4 @@
-"""The new folder of an export, written completely or not at all, and its texts; their templates are next to this module."""
+"""The folder of an export, which is written completely or not at all, and texts from the templates next to this module."""
 
 import os
 import shutil
@@ -22,7 +22,10 @@ def check(folder: Path) -> None:
 
 @contextmanager
 def new_folder(folder: Path) -> Iterator[Path]:
-    """A folder to write into, renamed to ``folder`` on success and removed otherwise; InputError if ``folder`` is not free."""
+    """A context with a temporary folder, which is renamed to ``folder`` on success and removed on failure.
+
+    Raises InputError unless ``folder`` is missing or empty.
+    """
     folder = folder.resolve()
     check(folder)
     files.clear(folder)
@@ -40,7 +43,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, case: Case, file: str | None = None, **values: str) -> None:
-    """Write the template ``file``, by default with the name of ``path``, filled with facts of the ``case`` and ``values``."""
+    """Write the template ``file``, by default that with the name of ``path``, filled with facts on the ``case`` and ``values``."""
     template = Template((Path(__file__).parent / (file or path.name)).read_text(encoding="utf-8"))
     known = {
         "title": case.title,

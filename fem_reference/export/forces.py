@@ -1,4 +1,4 @@
-"""Forces on bones in runs, as a table and as points with vectors, and the moment arms about joints."""
+"""Forces on bones in runs, as a table with moment arms about joints, and as points with vectors."""
 
 import math
 from collections.abc import Iterator
@@ -28,7 +28,10 @@ _NOWHERE = np.zeros(3)
 
 
 def write_table(comparison: Comparison, path: Path) -> None:
-    """Write a row for each run, frame and bone that has a force or a joint; unknown and infinite values are left empty."""
+    """Write a table with a row for each run, each frame and each bone that has a force or a joint.
+
+    Values that are unknown or infinite are empty.
+    """
     found = (row for run in comparison.runs for bone in comparison.setup.bones for row in _rows(comparison, run, bone))
     cells = (["" if isinstance(one, float) and not math.isfinite(one) else one for one in row] for row in found)
     write_csv(path, COLUMNS, cells)
@@ -60,8 +63,10 @@ def _rows(comparison: Comparison, run: Run, bone: Bone) -> Iterator[tuple[object
 
 
 def applied(run: Run, bone: Bone, setup: Setup) -> Floats:
-    """Points of application (f, 3) [mm] of the force on a ``bone``, NaN if it is 0: the points of the central axis, about which the
-    moment is along the force, that are nearest to the middle of the attachment, or to the origin for a bone without an attachment.
+    """The points of application (f, 3) [mm] of the force on a ``bone``, NaN if the force is 0.
+
+    The central axis is the line about which the moment is parallel to the force. The point of application is the point of this line
+    that is nearest to the mean of the attached vertices, or to the origin for a bone without an attachment.
     """
     attached = [one.vertices for one in setup.attached if one.bone.name == bone.name]
     vertices = np.concatenate(attached) if attached else np.zeros(0, np.int64)
@@ -76,7 +81,7 @@ def applied(run: Run, bone: Bone, setup: Setup) -> Floats:
 
 
 def block(run: Run, setup: Setup, i: int) -> DataBlock | None:
-    """Points of application with the vectors ``force`` [N] at the frame of index ``i``; None if the run has no force there."""
+    """The points of application with the vectors ``force`` [N] at the frame with index ``i``; None if there is no force."""
     known = [bone for bone in setup.bones if bone.name in vector_names(run.scalars, "force_on_")]
     points = np.array([applied(run, bone, setup)[i] for bone in known]).reshape(-1, 3)
     forces = np.array([run.force(bone.name)[i] for bone in known]).reshape(-1, 3)

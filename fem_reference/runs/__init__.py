@@ -1,1 +1,1 @@
-"""Runs: frames, status, cost and provenance, and their store on disk."""
+"""Runs, which consist of frames, status, cost and provenance, and the store of runs on disk."""

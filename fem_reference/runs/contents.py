@@ -1,4 +1,4 @@
-"""The contents of run.json as a record, read strictly: a damaged file is refused entirely."""
+"""The contents of run.json as a record. It is parsed strictly: a file with any damage is rejected."""
 
 import json
 from collections.abc import Mapping
@@ -31,12 +31,12 @@ Status = Literal[
     "stopped",
 ]
 FORMAT = 1
-# The contents of run.json while a run is made.
+# The contents of run.json while a run is being solved.
 RunJson = dict[str, Any]
 
 
 class Origin(Record):
-    """Provenance of a run, as far as results depend on it."""
+    """The part of the provenance of a run on which results depend."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="allow")
     versions: dict[str, str] = Field(default_factory=dict)
@@ -44,7 +44,7 @@ class Origin(Record):
 
 
 class Contents(Record):
-    """The contents of run.json of a finished run."""
+    """The contents of run.json for a finished run."""
 
     format: Literal[1]
     name: Name
@@ -70,8 +70,8 @@ class Contents(Record):
 
 
 def frame_file(number: float, suffix: str) -> str:
-    """The name of a file of the frame with a ``number``; ValueError if the number is not an integer, as two frames would share a
-    file.
+    """The name of a file for the frame ``number``. Raises ValueError if the number is not an integer, as two frames might then have
+    the same file.
 
     >>> frame_file(10, ".vtp")
     'frame_0010.vtp'
@@ -82,19 +82,19 @@ def frame_file(number: float, suffix: str) -> str:
 
 
 def amend(folder: Path, **changes: Any) -> None:
-    """Change the values of some keys in the run.json in ``folder``."""
+    """Change the values of keys in the run.json of the run in ``folder``."""
     place = folder / "run.json"
     stored = texts.read_json(place, "a run")
     files.write_text(place, json.dumps(stored | changes, indent=1, allow_nan=False))
 
 
 def vector_scalars(name: str, vector: Floats) -> dict[str, float]:
-    """The components of a ``vector`` (3,) as scalars of a frame."""
+    """The components of a ``vector`` (3,) as scalars of a frame, with ``name`` and the axis as names."""
     return {f"{name}_{axis}": float(value) for axis, value in zip("xyz", vector, strict=True)}
 
 
 def vector_names(scalars: Mapping[str, Floats], kind: str) -> list[str]:
-    """The names for which ``scalars`` contains the components of a vector of a ``kind``.
+    """The names of all vectors of a ``kind``, such as the bones of forces, whose components are in ``scalars``.
 
     >>> vector_names(dict.fromkeys(vector_scalars("force_on_femur", np.zeros(3))), "force_on_")
     ['femur']
@@ -103,7 +103,7 @@ def vector_names(scalars: Mapping[str, Floats], kind: str) -> list[str]:
 
 
 def scalar_vectors(scalars: Mapping[str, Floats], kind: str, name: str) -> Floats:
-    """The vectors (f, 3) of a ``kind`` from the components in ``scalars``; InputError if ``name`` has none."""
+    """The vectors (f, 3) of a ``kind`` with a ``name``, from components in ``scalars``. Raises InputError if there are none."""
     keys = [f"{kind}{name}_{axis}" for axis in "xyz"]
     if not set(keys) <= set(scalars):
         known = ", ".join(vector_names(scalars, kind))
@@ -113,7 +113,7 @@ def scalar_vectors(scalars: Mapping[str, Floats], kind: str, name: str) -> Float
 
 
 def point(centre: ArrayLike) -> Floats:
-    """A ``centre`` as a point (3,) [mm]; InputError unless it is three finite numbers."""
+    """The point (3,) [mm] that a user gives as ``centre``. Raises InputError unless it consists of three finite numbers."""
     try:
         found = np.asarray(centre, float)
     except (TypeError, ValueError, OverflowError):

@@ -1,4 +1,4 @@
-"""The key of a run: a hash over the scene, the settings, and the source code that its solver reaches."""
+"""The key of a run: a hash over the scene, the settings, and the source code on which the solver depends."""
 
 import ast
 import hashlib
@@ -14,9 +14,9 @@ from fem_reference.foundations import version
 from fem_reference.foundations.version import __version__
 
 PACKAGE = Path(__file__).parent.parent
-# An import in the style of a formatter: over several lines only in brackets. Parsing imports alone takes a sixth of the time.
+# An import in formatted code, which spans several lines only in brackets. Parsing only imports takes a sixth of the time.
 _IMPORT = re.compile(rb"^[ \t]*((?:from [\w.]+ )?import (?:\([^)]*\)|[^\n(]+))", re.MULTILINE)
-# Code that makes problems from scenes determines every run; some modules of it are found by name at run time, not by imports.
+# The packages that make problems from scenes, which determine every run. Some of their modules are loaded by name, without imports.
 _BEFORE = ("foundations", "io", "effects", "geometry", "scenes", "problems")
 _MADE_WITH = (
     "numpy",
@@ -39,7 +39,7 @@ def key(scene: str, solver: str, settings: Mapping[str, object]) -> str:
 
 @cache
 def code_hash(solver: str, package: Path = PACKAGE) -> str:
-    """A hash of 16 digits over the source files that determine the runs of ``solver`` in ``package``."""
+    """A hash of 16 digits over the source files in ``package`` that determine the runs of ``solver``."""
     digest = hashlib.sha256()
     for path in sorted(sources(solver, package)):
         digest.update(str(path.relative_to(package)).encode())
@@ -48,7 +48,9 @@ def code_hash(solver: str, package: Path = PACKAGE) -> str:
 
 
 def sources(solver: str, package: Path = PACKAGE) -> set[Path]:
-    """The files that determine the runs of ``solver``: packages that make problems, and its modules with all their imports."""
+    """The files that determine the runs of ``solver``: the packages that make problems, the modules of the solver, and the modules
+    that any of these import, directly or indirectly.
+    """
     found = {path for name in _BEFORE for path in _files(package / name)}
     waiting = _module(package, ["solvers", solver]) | {path for path in found if path.suffix == ".py"}
     while waiting:
@@ -60,7 +62,9 @@ def sources(solver: str, package: Path = PACKAGE) -> set[Path]:
 
 @cache
 def imported(path: Path, package: Path) -> tuple[str, ...]:
-    """Names that the file at ``path`` imports from ``package``: modules, and members that may be modules, without its own name."""
+    """The names that the file at ``path`` imports from ``package``, without the name of the package. These are modules, and members
+    that may be modules.
+    """
     start, found = f"{package.name}.", list[str]()
     for node in ast.walk(_tree(path.read_bytes())):
         if isinstance(node, ast.Import):
@@ -76,7 +80,7 @@ def imported(path: Path, package: Path) -> tuple[str, ...]:
 
 
 def _tree(source: bytes) -> ast.AST:
-    """The syntax tree of the imports of a ``source``; of the entire source if a text only looks like an import."""
+    """The syntax tree of the imports in a ``source``, or of the entire source if something else looks like an import."""
     try:
         return ast.parse(b"\n".join(_IMPORT.findall(source)))
     except SyntaxError:
@@ -84,18 +88,20 @@ def _tree(source: bytes) -> ast.AST:
 
 
 def machine() -> str:
-    """The machine of this process."""
+    """A description of the machine on which this process runs."""
     return f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
 
 
 def made_with(manner: str = "") -> dict[str, str]:
-    """Provenance of a measurement: our version, the machine, the ``manner`` in which runs use it, and versions of packages."""
+    """The provenance of a measurement: the version of fem_reference, the machine, and the versions of packages. ``manner``: a text
+    on how runs use the machine.
+    """
     described = ", ".join(filter(None, [machine(), manner]))
     return {"fem_reference": __version__, "machine": described, **versions()}
 
 
 def versions() -> dict[str, str]:
-    """The versions of the packages that a run may depend on, and of Python."""
+    """The versions of Python and of the packages on which a run may depend."""
     return {"python": platform.python_version(), **version.versions(_MADE_WITH)}
 
 
@@ -104,8 +110,9 @@ def _files(folder: Path) -> set[Path]:
 
 
 def _module(package: Path, parts: list[str]) -> set[Path]:
-    """The files of the module ``parts`` below ``package``, and of the packages around it except the outermost, which only lists
-    public names; for a solver in a folder, the whole folder. Empty if there is no such module.
+    """The files of the module with the path ``parts`` in ``package``; for a solver in a folder, all files in the folder. They
+    include each ``__init__.py`` of the packages around the module, except that of ``package``, which only lists public names. Empty
+    if there is no such module.
     """
     place = package.joinpath(*parts)
     if place.is_dir():

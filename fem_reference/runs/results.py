@@ -1,7 +1,8 @@
-"""Full results of a reference run: displacement, stress, pressure, det F, fibre stretch and stress at any points in the muscle.
+"""Full results of a reference run, such as displacement, stress, pressure and det F, at any points in the muscle.
 
-A run solved with ``store_state = true`` keeps its unknowns. All results follow from them: the deformation gradient from the
-functions of the element, the stress from the energies of the effects, differentiated by ``jets``. FEniCSx is not needed.
+A run that is solved with ``store_state = true`` stores its unknowns. They determine all results: the deformation gradient through
+the basis functions of the element, and the stress through the energies of the effects, differentiated by ``jets``. FEniCSx is not
+needed.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -39,15 +40,15 @@ NAMES = (
     "von_mises",
     "fibre_stress",
 )
-# A point counts as outside the tets if its distance from them exceeds this fraction of the mesh's diagonal; less is rounding.
+# A point is outside the tetrahedra if its distance from them exceeds this fraction of the mesh's diagonal; less is rounding.
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """The ``states`` by frame number of a muscle that fills ``mesh``, with its ``effects``. ``fibre`` (m, 3) is the unit vector
-    along the fibres at the middle of each tet, if known. The solver uses directions at quadrature points; in a bar of 6 mm tets
-    these differ by 2 degrees (rms). ``regions``: the regions in which effects act, by name.
+    """The ``states`` of a muscle, by frame number, with its ``mesh`` and ``effects``. ``regions``: the regions in which effects
+    act, by name. ``fibre`` (m, 3): the unit vectors along the fibres at the centroids of the tetrahedra, if known. The solver uses
+    directions at quadrature points; in a bar with tetrahedra of 6 mm these differ by 2 degrees (rms).
     """
 
     mesh: TetMesh
@@ -62,15 +63,15 @@ class Results:
         return tuple(self.states)
 
     def evaluate(self, points: ArrayLike, frame: float, names: Sequence[str] | None = None) -> dict[str, Floats]:
-        """Results by name at ``points`` (n, 3) [mm] of the rest state, at one of the frame numbers ``frames``.
+        """Results by name at ``points`` (n, 3) [mm], given in the rest state, for a ``frame`` number in ``frames``.
 
-        ``names``, by default all that exist, are among ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3),
-        ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], the mixed unknown, positive where the volume grows;
-        ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa]; and ``fibre_stress``
-        (n,) [MPa] along the present fibre. InputError if the run lacks the frame or the result.
-
-        A point outside the tetrahedra has NaN everywhere. F and the stress jump between tetrahedra: a shared point has the values
-        of one tetrahedron. The stress is NaN where det F is not positive.
+        ``names``: the results to compute, by default all that exist. They are ``displacement`` (n, 3) [mm];
+        ``deformation_gradient`` F (n, 3, 3), ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], the mixed unknown,
+        which is positive where the volume grows; ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa];
+        ``von_mises`` (n,) [MPa]; and ``fibre_stress`` (n,) [MPa], the stress along the deformed fibre. All are NaN at a point
+        outside the tetrahedra. F and the stress are discontinuous between tetrahedra, so a shared point has the values of one of
+        its tetrahedra. The stress is NaN where det F is not positive. Raises InputError if the run does not have the frame or the
+        result.
         """
         wanted = self._checked(names, self._state(frame))
         found = np.asarray(points, float)
@@ -88,7 +89,7 @@ class Results:
     def evaluate_in(
         self, tets: Ints, barycentric: Floats, frame: float, names: Sequence[str] | None = None
     ) -> dict[str, Floats]:
-        """Results as in :meth:`evaluate`, at points with ``barycentric`` coordinates (n, 4) in tetrahedra ``tets`` (n,)."""
+        """The results of :meth:`evaluate` at points with ``barycentric`` coordinates (n, 4) in the tetrahedra ``tets`` (n,)."""
         state = self._state(frame)
         wanted = self._checked(names, state)
         acting = [(effect, effect.amount(frame)) for effect in self.effects]
@@ -100,8 +101,8 @@ class Results:
         return {name: np.concatenate([part[name] for part in parts]) for name in wanted}
 
     def energies(self, frame: float) -> dict[str, float]:
-        """The energy W [N mm] of each effect that has one, by its name in scene files, at one of the frame numbers ``frames``. An
-        effect's share of a moment is -dW/dtheta, theta the angle of the joint. Contact and springs are left out.
+        """The energy W [N mm] of each effect with an energy, by its name in scene files, for a ``frame`` number in ``frames``.
+        Contact and springs are not included. The share of an effect in a moment is -dW/dtheta with the angle theta of the joint.
         """
         state, (rule, shares), found = self._state(frame), _rule(), dict[str, float]()
         acting = [(effect, effect.amount(frame)) for effect in self.effects]
@@ -114,7 +115,7 @@ class Results:
         return found
 
     def names(self, state: NodalState) -> tuple[str, ...]:
-        """Names of the results that follow from a state."""
+        """The names of the results that can be computed from a ``state``."""
         lacking = {"pressure"} if state.pressure.shape[1] == 0 else set()
         lacking |= {"fibre_stretch", "fibre_stress"} if self.fibre is None else set()
         return tuple(name for name in NAMES if name not in lacking)
@@ -131,7 +132,7 @@ class Results:
         return there if names is None else tuple(names)
 
     def _state(self, frame: float) -> NodalState:
-        """The state at a ``frame``; InputError if there is no state, or it has other tetrahedra."""
+        """The state at a ``frame``. Raises InputError if there is none, or if its arrays do not fit the mesh and the effects."""
         if frame not in self.states:
             raise InputError("frame", f"{frame:g}", f"one of {', '.join(f'{number:g}' for number in self.frames)}")
         state, m = self.states[frame], len(self.mesh.tets)
@@ -149,8 +150,8 @@ class Results:
 
 
 def of_run(folder: Path | str, case: str | Path | Case) -> Results:
-    """The results of the run in ``folder``, which belongs to ``case``: a name, a folder, or the case with the changes of that run.
-    InputError if there is no run with states, or the run is of another case.
+    """The results of the run in ``folder``. ``case``: the name or folder of its case, or the case with the changes of that run.
+    Raises InputError if there is no run with states, or if the run belongs to another case.
     """
     folder = Path(folder)
     run = store.load(folder)
@@ -163,7 +164,7 @@ def of_run(folder: Path | str, case: str | Path | Case) -> Results:
 
 
 class _Places:
-    """Points in ``tets`` (n,) of ``results`` at a state, with all quantities that an effect may depend on."""
+    """Points in the tetrahedra ``tets`` (n,) of ``results`` at a ``state``, with all quantities on which an effect may depend."""
 
     def __init__(self, results: Results, state: NodalState, tets: Ints, barycentric: Floats) -> None:
         self.results, self.state, self.tets, self.corners = results, state, tets, barycentric
@@ -176,20 +177,20 @@ class _Places:
         self.det_F = np.linalg.det(self.F)
 
     def _moved(self, nodal: Floats) -> tuple[Floats, Floats]:
-        """The displacement (n, 3) and deformation gradient (n, 3, 3) from values (m, k, 3) at nodes."""
+        """The displacement (n, 3) [mm] and the deformation gradient (n, 3, 3) from ``nodal`` displacements (m, k, 3) [mm]."""
         inside = nodal[self.tets]
         gradient = np.einsum("nai,nak->nik", inside, self.slopes)
         return np.asarray(np.einsum("na,nai->ni", self.functions, inside)), np.eye(3) + gradient
 
     def _pressure(self, of_cells: Floats) -> Floats | None:
-        """The pressure (n,) [MPa] from its values in cells (m, l), None if the element has no pressure."""
+        """The pressure (n,) [MPa] from its values ``of_cells`` (m, l) [MPa]; None if the element has no pressure."""
         inside = of_cells[self.tets]
         if inside.shape[1] == 0:
             return None
         return inside[:, 0] if inside.shape[1] == 1 else np.asarray((inside * self.corners).sum(axis=1))
 
     def values(self, names: Sequence[str], acting: Sequence[tuple[Effect, float]]) -> dict[str, Floats]:
-        """The arrays by name, as in ``Results.evaluate``."""
+        """The results with these ``names``, as described at ``Results.evaluate``. ``acting``: the effects and their amounts."""
         values: dict[str, Any] = {
             "displacement": self.displacement,
             "deformation_gradient": self.F,
@@ -209,8 +210,8 @@ class _Places:
         return {name: values[name] for name in names}
 
     def cauchy_stress(self, acting: Sequence[tuple[Effect, float]]) -> Floats:
-        """``sigma = 1/J dW/dF F^T`` (n, 3, 3) [MPa], with W the sum of the energies per unit rest volume at the pressure unknown
-        (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.10 and 3.8).
+        """The Cauchy stress ``sigma = 1/J dW/dF F^T`` (n, 3, 3) [MPa], where W is the sum of all energies per unit rest volume,
+        which also depend on the pressure unknown (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.10 and 3.8).
         """
         with np.errstate(all="ignore"):  # where det F is not positive
             jets = variables(self.F.reshape(-1, 9).T, curved=False)
@@ -221,7 +222,7 @@ class _Places:
         return np.asarray(stress)
 
     def energies(self, acting: Sequence[tuple[Effect, float]]) -> Iterator[tuple[str, Floats]]:
-        """The name of each effect with an energy, and its energy per unit rest volume (n,) [MPa]."""
+        """Yield the name of each effect with an energy, and the energy per unit rest volume (n,) [MPa]."""
         with np.errstate(all="ignore"):  # where det F is not positive
             now = elastic_state(acting, self._state([list(row) for row in np.moveaxis(self.F, 0, -1)], NUMPY))
             for effect, amount in acting:
@@ -232,7 +233,7 @@ class _Places:
                 yield "in_situ", self._at_rest(whole)
 
     def _at_rest(self, state: State) -> Any:
-        """The energy per unit rest volume (n,) [MPa] of the stress at rest of a body in situ at ``state``; 0 for any other body."""
+        """The energy per unit rest volume (n,) [MPa], at ``state``, of the stress at rest of a body in situ; 0 for other bodies."""
         if not len(self.state.response):
             return 0.0
         slopes = self._moved(self.state.response)[1] - np.eye(3)
@@ -243,7 +244,7 @@ class _Places:
         return in_situ.balancing(state, [list(row) for row in np.moveaxis(slopes, 0, -1)], pressure, shear)
 
     def _state(self, F: Sequence[Sequence[Any]], functions: Functions) -> State:
-        """The state of the points for effects, with the entries of ``F`` as numbers or variables."""
+        """The state of the points as effects need it. The entries of ``F`` are arrays or jets, and ``functions`` apply to them."""
         state = self.state
         passed = state.before if len(state.before) else np.zeros_like(state.displacement)
         before, F_before = self._moved(passed)
@@ -263,7 +264,7 @@ class _Places:
 
 @cache
 def _rule() -> tuple[Floats, Floats]:
-    """Barycentric coordinates (27, 4) and weights (27,) of a conical product rule of degree 5 (Gauss-Jacobi; Stroud 1971)."""
+    """The barycentric coordinates (27, 4) and weights (27,) of a conical product rule of degree 5 (Gauss-Jacobi; Stroud 1971)."""
     (u, a), (v, b), (w, c) = (scipy.special.roots_jacobi(3, power, 0) for power in (2, 1, 0))
     x, y, z = np.meshgrid((1 + u) / 2, (1 + v) / 2, (1 + w) / 2, indexing="ij")
     rest = (1 - x) * (1 - y)
@@ -273,24 +274,24 @@ def _rule() -> tuple[Floats, Floats]:
 
 
 def von_mises(stress: Floats) -> Floats:
-    """``sqrt(3/2 s : s)`` (n,) of stresses (n, 3, 3), s their deviator (von Mises 1913)."""
+    """The von Mises stress ``sqrt(3/2 s : s)`` (n,) of stresses (n, 3, 3) with the deviators s (von Mises 1913)."""
     deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
     return np.asarray(np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2))))
 
 
 def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats, Floats]:
-    """The Lagrange functions (n, count) of a tetrahedron at ``barycentric`` coordinates L (n, 4), and their gradients
-    (n, count, 3) [1/mm] from the ``gradients`` (n, 4, 3) of the coordinates. ``count`` is 4 or 10; the nodes are in the order of
-    ``body.reference_nodes``.
+    """The Lagrange functions (n, count) of a tetrahedron and their gradients (n, count, 3) [1/mm], at ``barycentric`` coordinates L
+    (n, 4). ``gradients`` (n, 4, 3) [1/mm]: the gradients of the coordinates. ``count``: the number of nodes, 4 or 10, which are in
+    the order of ``body.reference_nodes``.
 
-    Of degree 2: ``L_i (2 L_i - 1)`` at corners, ``4 L_i L_j`` between two (Zienkiewicz and Taylor 2000, The Finite
-    Element Method, vol. 1, 8.12).
+    Functions of degree 2 are ``L_i (2 L_i - 1)`` for a corner and ``4 L_i L_j`` for a mid-edge node (Zienkiewicz and Taylor 2000,
+    The Finite Element Method, vol. 1, 8.12).
     """
     if count == 4:
         return barycentric, gradients
     nodes = reference_nodes("tetrahedron", 2)
     near = np.column_stack([1 - nodes.sum(axis=1), nodes]) > 0
-    # The two corners on either side of each node; for a corner, the corner twice.
+    # The two corners at the ends of the edge of each node; for a node at a corner, this corner twice.
     i, j = near.argmax(axis=1), 3 - near[:, ::-1].argmax(axis=1)
     at_corner, scale = np.where(i == j, 1.0, 0.0), np.where(i == j, 2.0, 4.0)
     one, other = barycentric[:, i], barycentric[:, j]

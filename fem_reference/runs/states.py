@@ -1,9 +1,9 @@
-"""The finite element states of a run, and its scalar fields: arrays by frame, written and read with numpy alone.
+"""The finite element states and the scalar fields of a run: arrays for each frame, written and read with numpy alone.
 
-<run>/state/rest.npz          points (n, 3) [mm], tets (m, 4), fibre (m, 3): the unit vector along the fibres, (0, 3) if none
+<run>/state/rest.npz          points (n, 3) [mm], tets (m, 4), fibre (m, 3): unit vectors along the fibres, (0, 3) without fibres
             /frame_0010.npz   the arrays of ``NodalState``
      /field/frame_0000.vtu    a scalar field at the vertices, for ParaView
-            /frame_0000.npz   the arrays of ``NodalField``, with its mesh
+            /frame_0000.npz   the arrays of ``NodalField`` and the mesh
 """
 
 import zipfile
@@ -22,10 +22,10 @@ from fem_reference.io import files
 from fem_reference.runs.contents import frame_file
 
 FOLDER, FIELD = "state", "field"
-VALUES = "psi"  # the name of a field itself
-# The maximum size [bytes] of the arrays in a file: that of a state of a million tetrahedra.
+VALUES = "psi"  # the name of the array with the values of a field
+# The maximum size [bytes] of the arrays in a file, which is the size of a state with a million tetrahedra.
 MOST_BYTES = 2**30
-# The arrays of a file by name.
+# The arrays in a file by name.
 Arrays = dict[str, NDArray[Any]]
 _ARRAYS = ("displacement", "pressure", "before", "rate")
 _IN_SITU = ("response", "response_pressure")
@@ -33,13 +33,15 @@ _IN_SITU = ("response", "response_pressure")
 
 @dataclass(frozen=True, eq=False)
 class NodalState:
-    """The unknowns of m cells. ``displacement`` (m, k, 3) [mm] is given at the k nodes of the element, in the order of
-    ``body.reference_nodes``. ``pressure`` (m, l) [MPa] is given at the corners (l = 4 in a tetrahedron), is constant in the cell (l
-    = 1), or absent (l = 0).
+    """The unknowns of m cells.
+
+    ``displacement`` (m, k, 3) [mm] is given at the k nodes of the element, in the order of ``body.reference_nodes``. ``pressure``
+    (m, l) [MPa] is given at the corners (l = 4 in a tetrahedron), is constant in the cell (l = 1), or is absent (l = 0).
 
     If an effect depends on velocities, ``before`` (m, k, 3) [mm] is the displacement at the start of the last load step, and
-    ``rate`` [1/s] is 1 over its duration; otherwise they are (0, 0, 3) and 0. For a body in situ, ``response`` (m, k, 3) [mm] and
-    ``response_pressure`` (m, l) [MPa] give the stress at rest (``effects.in_situ``); otherwise they are (0, 0, 3) and (0, 0).
+    ``rate`` [1/s] is the reciprocal of its duration; otherwise they have the shape (0, 0, 3) and the value 0. For a body in situ,
+    ``response`` (m, k, 3) [mm] and ``response_pressure`` (m, l) [MPa] determine the stress at rest (``effects.in_situ``); otherwise
+    they have the shapes (0, 0, 3) and (0, 0).
     """
 
     displacement: Floats
@@ -51,35 +53,38 @@ class NodalState:
 
     @property
     def arrays(self) -> Arrays:
-        """The arrays to write, by name."""
+        """The arrays to be written, by name."""
         return {name: getattr(self, name) for name in (*_ARRAYS, *(_IN_SITU if len(self.response) else ()))}
 
     @classmethod
     def of(cls, arrays: Mapping[str, ArrayLike]) -> "NodalState":
-        """The state of ``arrays`` by name; KeyError if one is missing."""
+        """The state with these ``arrays``, given by name. Raises KeyError if an array is missing."""
         displacement, pressure, before, rate = (np.asarray(arrays[name], float) for name in _ARRAYS)
         own = {name: np.asarray(arrays[name], float) for name in _IN_SITU if name in arrays}
         return cls(displacement, pressure, before, float(rate), **own)
 
 
 def write_rest(folder: Path, mesh: TetMesh, fibre: Floats | None) -> None:
-    """Write the rest ``mesh`` of the states of the run in ``folder``, and the directions ``fibre`` (m, 3) in its tetrahedra."""
+    """Write the ``mesh`` at rest and its fibre directions ``fibre`` (m, 3) for the states of the run in ``folder``."""
     directions = np.zeros((0, 3)) if fibre is None else fibre
     write_arrays(folder / FOLDER / "rest.npz", {"points": mesh.points, "tets": mesh.tets, "fibre": directions})
 
 
 def write(folder: Path, frame: float, state: NodalState) -> None:
-    """Write the ``state`` at a ``frame`` number of the run in ``folder``."""
+    """Write the ``state`` at the frame number ``frame`` into the folder of a run."""
     write_arrays(_place(folder, frame), state.arrays)
 
 
 def are_kept(folder: Path, frames: tuple[int, ...]) -> bool:
-    """True if the run in ``folder`` keeps its states at all ``frames``."""
+    """True if the run in ``folder`` has stored states at all ``frames``."""
     return all(path.is_file() for path in (folder / FOLDER / "rest.npz", *(_place(folder, frame) for frame in frames)))
 
 
 def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
-    """The mesh and the fibre directions (m, 3) of the states in a run's ``folder``; InputError if there are none."""
+    """The mesh at rest, and the fibre directions (m, 3) or None without fibres, of the states in the folder of a run.
+
+    Raises InputError if the run has no states, or if the file is damaged.
+    """
     place = folder / FOLDER / "rest.npz"
     if not place.is_file():
         raise InputError(folder, "a run without states", "a run of the reference, solved with store_state = true")
@@ -95,7 +100,7 @@ def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
 
 
 class StoredStates(Mapping[float, NodalState]):
-    """The states of the run in ``folder`` by frame number, read on demand; the last one is kept in memory."""
+    """The states of the run in ``folder``, by frame number. They are read on demand, and the last state is kept in memory."""
 
     def __init__(self, folder: Path, frames: tuple[int, ...]) -> None:
         self.folder, self.frames = folder, frames
@@ -125,14 +130,17 @@ def _place(folder: Path, frame: float) -> Path:
 
 
 def write_arrays(path: Path, arrays: Arrays) -> None:
-    """Write arrays by name into an .npz file."""
+    """Write ``arrays`` into an .npz file."""
     path.parent.mkdir(exist_ok=True)
     with files.whole(path) as part:
         np.savez(part, allow_pickle=False, **arrays)
 
 
 def read_arrays(path: Path, names: tuple[str, ...] = (), also: tuple[str, ...] = ()) -> Arrays:
-    """The arrays ``names`` (by default all) of an .npz file, and any of ``also`` that exist; InputError if the file is damaged."""
+    """The arrays in an .npz file that ``names`` lists (by default all), and the arrays in ``also`` that exist.
+
+    Raises InputError if the file is damaged, too large or without one of ``names``.
+    """
     try:
         with path.open("rb") as file:
             with zipfile.ZipFile(file) as members:
@@ -149,9 +157,11 @@ def read_arrays(path: Path, names: tuple[str, ...] = (), also: tuple[str, ...] =
 
 @dataclass(frozen=True, eq=False)
 class NodalField:
-    """Arrays by name at the nodes of ``mesh``: ``psi`` (N,) at the vertices, then for elements of order 2 at the midpoints of
-    ``mesh.edges``. ``components`` (n, d) at the vertices: the vector whose norm is psi, if the solver computes it. ``form``: the
-    weak form that was solved. After a failure psi is NaN.
+    """A scalar field as arrays at the nodes of a ``mesh``.
+
+    The array ``psi`` (N,) has the values at the vertices and, for elements of order 2, then at the midpoints of ``mesh.edges``. It
+    is NaN after a failure. The array ``components`` (n, d), which some solvers add, has the vector whose norm is psi at the
+    vertices. ``form``: the weak form that was solved.
     """
 
     mesh: FieldMesh
@@ -160,7 +170,7 @@ class NodalField:
 
 
 def write_field(path: Path, field: NodalField) -> None:
-    """Write a field: the values of all nodes as an array, and the vertices into ``path``, a .vtu file for ParaView."""
+    """Write a field twice: at the vertices, into the .vtu file ``path`` for ParaView; and at all nodes, into an .npz file."""
     mesh = field.mesh
     write_arrays(path.with_suffix(".npz"), {"points": mesh.points, "cells": mesh.cells} | field.arrays)
     shown = {name: values[: len(mesh.points)] for name, values in field.arrays.items()}
@@ -168,7 +178,10 @@ def write_field(path: Path, field: NodalField) -> None:
 
 
 def read_field(folder: Path, numbers: tuple[int, ...]) -> tuple[FieldMesh, dict[str, Floats]]:
-    """The mesh of the run in ``folder``, and by name its arrays (f, ...) over frames; InputError if a file is damaged."""
+    """The mesh of the fields of the run in ``folder``, and their arrays (f, ...) by name, at the frame ``numbers`` (f,).
+
+    Raises InputError if a file is damaged.
+    """
     frames = []
     for number in numbers:
         path = folder / FIELD / frame_file(number, ".npz")
@@ -182,7 +195,7 @@ def read_field(folder: Path, numbers: tuple[int, ...]) -> tuple[FieldMesh, dict[
 
 
 def _check_field(arrays: dict[str, Any], first: dict[str, Any], path: Path) -> None:
-    """Raise InputError if the arrays of a frame are not a field, or belong to another mesh than the ``first`` frame."""
+    """Raise InputError if the arrays of a frame are not a field, or not a field on the mesh of the ``first`` frame."""
     points, cells, values = arrays["points"], arrays["cells"], arrays[VALUES]
     found = {name: (array.shape, array.dtype.kind) for name, array in arrays.items()}
     usable = (

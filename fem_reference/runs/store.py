@@ -1,13 +1,13 @@
-"""Runs: the result of a solver on a problem, in memory and on disk.
+"""Runs, the results of a solver for a problem, in memory and on disk.
 
-<store>/<solver>-<key>/run.json        status, cost, provenance, numbers per frame
-                      /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
-                      /rest/           surface.vtp and fibres.vtp at rest, for a solver that moves no surface
+<store>/<solver>-<key>/run.json        status, cost, provenance, and scalars of each frame
+                      /surface.pvd     the user's surface at all frames, for ParaView; its files are surface/frame_0010.vtp, ...
+                      /rest/           surface.vtp and fibres.vtp at rest, if the solver moves no surface
                       /fibres.pvd      fibre polylines, if the solver has an interior
                       /tets.pvd        tetrahedra, if the solver has them
-                      /field.pvd       a scalar field on its mesh, for a scalar problem (``states``)
+                      /field.pvd       the scalar field on its mesh, for a scalar problem (``states``)
                       /state/          the unknowns of the tetrahedra, if requested (``states``)
-                      /restart/        of an unfinished run: the state from which its solver continues (``writer``)
+                      /restart/        the state from which the solver continues an unfinished run (``writer``)
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -35,22 +35,22 @@ from fem_reference.scenes.case import Part
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One requested frame, by its ``number``, with the parts that the solver has.
+    """The results at a requested frame with a ``number``. Parts that the solver does not have are None or empty.
 
-    ``surface`` (n, 3), ``fibres`` (m, 3) and ``points`` (k, 3) [mm]: positions of the surface's vertices, of the fibres' points and
-    of the mesh's nodes, (0, 3) without cells. ``forces`` (3,) [N]: the force of each constraint (along its prescribed components)
-    and obstacle, by name. ``moments`` (3,) [N mm]: the moments of these forces about the origin. If several regions prescribe a
-    component at a node, each includes its force. ``state``: the unknowns of the cells, if requested. ``field``: the field of a
-    scalar problem. ``residuals``: the norms [N, mm3] before and after each Newton iteration of the last load step. ``note``: the
-    text that progress shows for the frame.
+    ``surface`` (n, 3), ``fibres`` (m, 3), ``points`` (k, 3) [mm]: positions of the vertices of the surface, of the points of the
+    fibres and of the nodes of the mesh. ``forces`` (3,) [N]: the force of each constraint, along its prescribed components, and of
+    each obstacle, by name. If several regions prescribe a component at a node, the force of each includes this node. ``moments``
+    (3,) [N mm]: the moments of these forces about the origin. ``state``: the unknowns of the cells, if requested. ``field``: the
+    field of a scalar problem. ``residuals``: the norms [N, mm3] before and after each Newton iteration of the last load step.
+    ``note``: a text that is shown with the progress of the run.
 
     ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, stored energy [N mm], newton_iterations,
-    cut_backs. The reference adds, for means over cells, min_cell_volume_ratio and max_cell_volume_ratio and, if a law limits the
-    fibre stretch, min_cell_fibre_stretch and max_cell_fibre_stretch. outside_law is the number of cells outside the range of a law.
-    If all energy is stored, energy_gap is the gap since the last frame (``solvers/fenicsx/path``; for muscles by Simpson's rule if
-    the trapezoidal rule is poor). If the tangent is symmetric, negative_modes are counted, and material_modes among them
-    (``solvers/fenicsx/stability``). With contact there are the greatest contact_depth [mm] and contact_pressure [MPa], and
-    contact_area at rest [mm2]; for a muscle the stresses of ``stress_statistics``, such as stress_von_mises_p95 [MPa].
+    cut_backs. The reference adds the extremes of means over cells, min_cell_volume_ratio and max_cell_volume_ratio and, if a law
+    limits the fibre stretch, min_cell_fibre_stretch and max_cell_fibre_stretch; outside_law, the number of cells outside the range
+    of a law; if all energy is stored, energy_gap, the gap since the last frame (``solvers/fenicsx/path``; for muscles by Simpson's
+    rule if the trapezoidal rule is poor); if the tangent is symmetric, the number of negative_modes and of material_modes among
+    them (``solvers/fenicsx/stability``); with contact, the maximum contact_depth [mm] and contact_pressure [MPa], and the
+    contact_area at rest [mm2]; for a muscle, the stresses of ``stress_statistics``, such as stress_von_mises_p95 [MPa].
     """
 
     number: float
@@ -67,7 +67,7 @@ class Frame:
 
     @classmethod
     def of_field(cls, problem: FieldProblem, values: Floats, form: str, components: Floats | None = None) -> "Frame":
-        """The frame of a field solved in a weak ``form``, with ``values`` and ``components`` as :class:`NodalField`."""
+        """The frame of a scalar field; ``form``, ``values`` (psi) and ``components`` are those of :class:`NodalField`."""
         more = {} if components is None else {"components": components}
         return cls(problem.frames[0], field=NodalField(problem.mesh, {VALUES: values} | more, form))
 
@@ -77,7 +77,7 @@ Sink = Callable[[Frame], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a solve: a status, a sentence for the user, and the cost (seconds by phase ``seconds_...``, counts)."""
+    """The outcome of a solve: a status, a message for the user, and the cost (times of phases, ``seconds_...``, and counts)."""
 
     status: Status
     message: str
@@ -86,13 +86,13 @@ class Outcome:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Frames that a solver produced for a problem: the muscle or the scalar field of a case, or a body.
+    """The result of a solver for a problem: the muscle or the scalar field of a case, or a body.
 
-    ``numbers`` (f,): frame numbers. ``positions`` (f, n, 3) [mm]: vertices of ``surface``, which is at rest. ``fibre_positions``
-    (f, m, 3) [mm]: points of ``fibres``, None for a surface-only solver. ``scalars`` (f,) by name. A solver that moves only lines
-    has no surface: ``has_surface`` is False, and all ``positions`` are NaN. A scalar run has a ``mesh`` instead, and ``fields`` (f,
-    ...) by name at its nodes, as in :class:`NodalField`. ``states``: all frames in memory, the full run of a body. ``body``,
-    ``settings``: the problem, for error bars of a body. ``residuals`` by frame. ``others``: the runs of the other muscles by name.
+    ``numbers`` (f,): frame numbers. ``surface``, ``fibres``: the shapes at rest. ``positions`` (f, n, 3) [mm]: vertices of the
+    surface; NaN, and ``has_surface`` is False, for a solver that moves only lines. ``fibre_positions`` (f, m, 3) [mm]: points of
+    the fibres, None for a solver without an interior. ``scalars``, ``residuals``: values at each frame. A run of a scalar problem
+    has instead a ``mesh`` and, at its nodes, ``fields`` (f, ...), the arrays of :class:`NodalField`. ``states``: all frames of a
+    run in memory. ``body``, ``settings``: the problem, for error bars of a body. ``others``: the runs of the other muscles by name.
     """
 
     name: str
@@ -117,14 +117,14 @@ class Run:
 
     @property
     def last(self) -> Frame:
-        """The last frame of a run in memory; ArithmeticError with the reason if some frames were not reached."""
+        """The last frame of a run in memory. Raises ArithmeticError, with the reason, if some frames were not reached."""
         if self.outcome.status != "converged":
             raise ArithmeticError(f"{self.outcome.status}: {self.outcome.message}")
         return self.states[-1]
 
     @property
     def carries(self) -> frozenset[Part]:
-        """The parts that can be measured."""
+        """The parts of the run that can be measured."""
         if self.mesh is not None:
             return frozenset({"field"})
         if self.has_surface:
@@ -133,25 +133,25 @@ class Run:
 
     @property
     def points(self) -> Floats:
-        """The vertices (n, d) of a field, else the vertices of the surface at rest (n, 3) [mm]."""
+        """The vertices (n, d) of the mesh of a scalar field, otherwise the vertices (n, 3) [mm] of the surface at rest."""
         return self.surface.points if self.mesh is None else self.mesh.points
 
     @property
     def values(self) -> Floats:
-        """The scalar field at all nodes (f, N); KeyError for a run without one."""
+        """The scalar field (f, N) at all nodes. Raises KeyError for a run without a scalar field."""
         return self.fields[VALUES]
 
     @property
     def vertex_values(self) -> Floats:
-        """The scalar field at the vertices (f, n)."""
+        """The scalar field (f, n) at the vertices."""
         return self.values[:, : len(self.points)]
 
     def force(self, bone: str) -> Floats:
-        """The force (f, 3) [N] of the muscle on a ``bone``, by attachments and contact; InputError if it is unknown."""
+        """The force (f, 3) [N] of the muscle on a ``bone`` through attachments and contact. Raises InputError if it is unknown."""
         return scalar_vectors(self.scalars, "force_on_", bone)
 
     def moment(self, bone: str, centre: ArrayLike = (0.0, 0.0, 0.0)) -> Floats:
-        """The moment (f, 3) [N mm] of the force on a ``bone`` about the point ``centre`` (3,) [mm]."""
+        """The moment (f, 3) [N mm] on a ``bone`` about the point ``centre`` (3,) [mm], by attachments and contact."""
         return scalar_vectors(self.scalars, "moment_on_", bone) - np.cross(point(centre), self.force(bone))
 
     def _repr_html_(self) -> str:
@@ -168,7 +168,7 @@ class Run:
 
 
 def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING) -> Run:
-    """The run in memory with ``frames``, and with the arrays that all frames have. ``rest``: the shapes at rest."""
+    """The run in memory that consists of ``frames``, with arrays of the parts that all frames have. ``rest``: shapes at rest."""
     states = tuple(frames)
 
     def stacked(name: str) -> Floats | None:
@@ -197,7 +197,7 @@ def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING)
 
 
 def load(folder: Path) -> Run:
-    """The run in ``folder``; InputError if there is no run, if it was cut off, or if one of its files is damaged."""
+    """The stored run in ``folder``. Raises InputError if there is no run, if it was cut off, or if one of its files is damaged."""
     place = folder / "run.json"
     state = texts.read_json(place, "the run.json of a stored run")
     if isinstance(state, dict) and state.get("status") == "running":
@@ -214,7 +214,7 @@ def load(folder: Path) -> Run:
 
 
 def _moved(folder: Path, numbers: tuple[int, ...], parts: Collection[str]) -> dict[str, Any]:
-    """The surface and the fibres of a run in ``folder``, at rest and moved, as in :class:`Run`."""
+    """The surface and the fibres of a run in ``folder``, at rest and at its frames, as keyword arguments of :class:`Run`."""
     names, has_surface = [frame_file(number, ".vtp") for number in numbers], "surface" in parts
     if has_surface:
         surfaces = [files.read_surface(folder / "surface" / file, 1.0) for file in names]
@@ -235,14 +235,14 @@ def _moved(folder: Path, numbers: tuple[int, ...], parts: Collection[str]) -> di
 
 
 def _check_same(folder: Path, names: list[str], frames: list[Floats], rest: Floats) -> None:
-    """Raise InputError if a frame has another number of points than the run at rest."""
+    """Raise InputError if the number of points in a frame differs from that at rest."""
     for name, points in zip(names, frames, strict=True):
         if len(points) != len(rest):
             raise InputError(folder / name, f"{len(points)} points", f"{len(rest)}, as in the rest state of the run")
 
 
 def status(folder: Path) -> str:
-    """The status in the ``run.json`` of a run in ``folder``; ``"running"`` if it was cut off, or ``"damaged"``."""
+    """The status in the ``run.json`` of a run in ``folder``: ``"running"`` for a run that was cut off, or ``"damaged"``."""
     try:
         return str(texts.read_json(folder / "run.json", "a run")["status"])
     except (InputError, KeyError, TypeError):
@@ -250,7 +250,7 @@ def status(folder: Path) -> str:
 
 
 def finished(folder: Path, ended: Collection[str] = ("converged",)) -> Run | None:
-    """The stored run in ``folder`` if there is one whose status is in ``ended``, else None."""
+    """The stored run in ``folder`` if its status is in ``ended``; None if there is no such run."""
     try:
         run = load(folder)
     except InputError:
@@ -259,14 +259,14 @@ def finished(folder: Path, ended: Collection[str] = ("converged",)) -> Run | Non
 
 
 def at_numbers(run: Run, values: Floats, numbers: tuple[int, ...], *, trusted: bool = True) -> Floats:
-    """The ``values`` (f, ...) of a run at frame ``numbers``, NaN if it has no such frame or is not ``trusted``."""
+    """The ``values`` (f, ...) of a run at the frames ``numbers``: NaN at a missing frame, and everywhere unless ``trusted``."""
     rows, lost = dict(zip(run.numbers, values, strict=True)), np.full(values.shape[1:], np.nan)
     return np.stack([rows.get(number, lost) if trusted else lost for number in numbers])
 
 
 def complete(run: Run, numbers: tuple[int, ...], *, trusted: bool = True) -> Run:
-    """The run over exactly the frames ``numbers``; frames that were not reached are NaN, so they never pass. All frames are NaN if
-    the run is not ``trusted``.
+    """The run at exactly the frames ``numbers``. Values at frames that were not reached are NaN, so these frames never pass. All
+    values are NaN if the run is not ``trusted``.
     """
     if run.numbers == numbers and trusted:
         return run
@@ -282,19 +282,19 @@ def complete(run: Run, numbers: tuple[int, ...], *, trusted: bool = True) -> Run
 
 
 def seconds_per_frame(run: Run) -> float | None:
-    """Time [s] to solve one reached frame after the first; None if the run was computed elsewhere and no time is given.
-    ``seconds_solve`` is a solver's time without compiling and writing; without this entry the full wall time counts.
+    """The mean time [s] to solve a frame after the first; None if the run was computed elsewhere and no time is given. The time is
+    ``seconds_solve``, which excludes compilation and output, or without this entry the wall-clock time of the run.
     """
     cost = run.outcome.cost
     seconds = cost.get("seconds_solve", cost.get("seconds"))
     solved = reached(run) - 1
     if run.solver == "recorded":
-        each = cost.get("seconds_per_frame")  # per frame number
+        each = cost.get("seconds_per_frame")  # for each frame number
         return None if each is None else each * (run.numbers[-1] - run.numbers[0]) / max(len(run.numbers) - 1, 1)
     return None if seconds is None or solved < 1 else seconds / solved
 
 
 def reached(run: Run) -> int:
-    """The number of frames with positions of the surface, or of the fibres if there is no surface."""
+    """The number of frames in which all positions are known, of the surface or, without a surface, of the fibres."""
     positions = run.positions if run.has_surface or run.fibre_positions is None else run.fibre_positions
     return int(np.isfinite(positions).all(axis=(1, 2)).sum())

@@ -1,4 +1,7 @@
-"""Frames and runs of a single muscle, extracted from those of several muscles, in which its scalars have its name as a prefix."""
+"""Frames and runs of a single muscle, extracted from a run of several muscles.
+
+In a run of several muscles, the scalars of each muscle begin with the name of the muscle.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,7 +13,7 @@ from fem_reference.problems.joining import Span, called
 from fem_reference.problems.muscles import MusclesProblem
 from fem_reference.runs.store import Frame, Run
 
-# Scalars of all muscles together, which are left out for a single muscle.
+# The beginnings of the names of scalars for all muscles together, which are omitted for a single muscle.
 _OF_ALL = (
     "volume_ratio",
     "energy",
@@ -25,7 +28,10 @@ _OF_ALL = (
 
 
 def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
-    """A ``frame``'s part for one muscle; a force that one of the ``others`` exerts on it is stored under that muscle's name."""
+    """The part of a ``frame`` of several muscles that belongs to one of them, whose name and indices are in ``span``.
+
+    ``others``: the names of the other muscles. A force that another muscle exerts on this muscle has the name of the other muscle.
+    """
     assert frame.surface is not None  # frames of the reference have a surface
     assert frame.fibres is not None
     forces, moments = (
@@ -48,12 +54,12 @@ def frame_of(frame: Frame, span: Span, others: tuple[str, ...]) -> Frame:
 
 
 def force_between(name: str, other: str) -> str:
-    """The key of the force of the muscle ``name`` on an ``other``."""
+    """The key of the force that the muscle ``name`` exerts on the muscle ``other``."""
     return f"{called(name, 'free')} on {called(other, 'free')}"
 
 
 def _own(key: str, name: str, others: tuple[str, ...]) -> str:
-    """The name of the force with a ``key`` in the run of the muscle ``name``; empty if this force does not act on that muscle."""
+    """The key, in the run of the muscle ``name`` alone, of the force ``key``; empty if this force does not act on the muscle."""
     for other in others:
         if key == force_between(other, name):
             return other
@@ -61,7 +67,7 @@ def _own(key: str, name: str, others: tuple[str, ...]) -> str:
 
 
 def beside(runs: Mapping[str, Run]) -> dict[str, Run]:
-    """The ``runs`` of muscles by name, with the same frames; each run gets the other runs as its ``others``."""
+    """The ``runs`` of muscles by name, all with the same frames, with the runs of the other muscles in the field ``others``."""
     return {
         name: replace(run, others={other: one for other, one in runs.items() if other != name})
         for name, run in runs.items()
@@ -69,7 +75,7 @@ def beside(runs: Mapping[str, Run]) -> dict[str, Run]:
 
 
 def run_of(run: Run, problem: MusclesProblem, name: str) -> Run:
-    """The part of the ``run`` of several muscles for the muscle with a ``name``, in memory."""
+    """The run, in memory, of the muscle ``name`` as a part of the ``run`` of several muscles."""
     span, own = next(one for one in problem.spans if one.name == name), problem.problems[name]
     begin = f"{name}."
     scalars: dict[str, Floats] = {

@@ -1,7 +1,7 @@
-"""Runs written to disk while they are solved, frame by frame.
+"""Writing runs to disk while they are solved, one frame after the other.
 
-Files are written atomically, ``run.json`` after the frame files that it names. A run with the status ``running`` was cut off or
-crashed; it is not read as a result, and continues if its solver can continue it.
+Files are written atomically, and ``run.json`` is written after the frame files that it names. A stored run with the status
+``running`` was cut off or crashed. It is not read as a result, but a solver that supports continuation continues it.
 """
 
 import json
@@ -26,20 +26,23 @@ from fem_reference.runs.contents import FORMAT, Contents, RunJson, frame_file
 from fem_reference.runs.store import Frame, Outcome
 
 RESTART = "restart"
-# Statuses of a solve that was killed, alone or with the process that stores it, for example because memory or disk was full.
+# The statuses of a run that was killed, for example when memory or disk was full: "running" if its writer was killed too.
 ENDED_EARLY = ("running", "crashed")
 
 
 @dataclass(frozen=True)
 class CutOff:
-    """The kept part of a run that was cut off: the ``numbers`` of its frames, and the ``folder`` of its solver's own files."""
+    """The stored part of a run that was cut off.
+
+    ``folder``: the folder with restart files of the solver. ``numbers``: the numbers of the stored frames.
+    """
 
     folder: Path
     numbers: tuple[int, ...]
 
 
 def stored_before(folder: Path, identity: RunJson) -> RunJson | None:
-    """The run.json of a run in ``folder`` that was cut off and can continue as the run of ``identity``, if there is one."""
+    """The run.json of a run in ``folder`` that was cut off and that the run of ``identity`` can continue; None if there is none."""
     place = folder / "run.json"
     with suppress(InputError):
         state = texts.read_json(place, "a run")
@@ -51,7 +54,7 @@ def stored_before(folder: Path, identity: RunJson) -> RunJson | None:
         wanted = json.loads(json.dumps(identity))
         same = (whole.solver, list(whole.frames)) == (wanted["solver"], wanted["frames"])
         if wanted["origin"].get("settings", {}).get("store_state") and "state" not in whole.parts:
-            return None  # its frames lack requested parts
+            return None  # the stored frames have no states, which are now requested
         if same and whole.origin.versions == wanted["origin"].get("versions", {}):
             for part in folder.rglob(".*"):  # incomplete files
                 part.unlink()
@@ -60,21 +63,24 @@ def stored_before(folder: Path, identity: RunJson) -> RunJson | None:
 
 
 def truncate(state: RunJson, number: float) -> None:
-    """Remove the frames from ``number`` on, which are solved again, from a ``state`` as in run.json."""
+    """Remove the frame ``number`` and later frames, which will be solved again, from a ``state``, the contents of run.json."""
     kept = sum(stored < number for stored in state["numbers"])
     state["numbers"], state["residuals"] = state["numbers"][:kept], state.get("residuals", [])[:kept]
     state["scalars"] = {name: values[:kept] for name, values in state["scalars"].items()} if kept else {}
 
 
 def places(folder: Path, number: float) -> tuple[Floats, Floats | None]:
-    """Positions [mm] of the surface (n, 3) and of the tets' points (k, 3), if any, in a stored frame of a run."""
+    """The positions [mm] of the surface (n, 3), and of the points of the tetrahedra (k, 3) or None, in a stored frame of a run."""
     tets = folder / "tets" / frame_file(number, ".vtu")
     surface = files.read_surface(folder / "surface" / frame_file(number, ".vtp"), 1.0).points
     return surface, files.read_points(tets) if tets.is_file() else None
 
 
 def pass_on(folder: Path, to: Path) -> None:
-    """Copy the stored part of the run in ``folder`` to the folder ``to``, unless that exists, for a run that continues from it."""
+    """Copy the run in ``folder``, if it has restart files, to the folder ``to``, where another run can continue it.
+
+    Nothing is copied if ``to`` exists. In both cases the restart files in ``folder`` are removed.
+    """
     if (folder / RESTART).is_dir() and not to.exists():
         with tempfile.TemporaryDirectory(dir=to.parent) as new:
             copy = shutil.copytree(folder, Path(new) / to.name)
@@ -85,23 +91,25 @@ def pass_on(folder: Path, to: Path) -> None:
 
 
 def clear(folder: Path) -> None:
-    """Remove the restart files of a finished run from its ``folder``."""
+    """Remove the restart files of the finished run in ``folder``."""
     shutil.rmtree(folder / RESTART, ignore_errors=True)
 
 
 log = logging.getLogger(__name__)
 
-# Between the first and the last frame, progress is reported at most once in this time [s].
+# The minimum time [s] between two reports of progress, except those of the first and the last frame.
 QUIET = 1.0
 
 
 class Writer:
-    """Writes one run into ``folder``. The folder is emptied first, unless it has a run that was cut off and can continue. Call
-    ``add`` for each frame, then ``close``. A frame with a stored number replaces the stored frame and all later frames.
+    """A writer that stores a run in ``folder``.
+
+    The folder is emptied first, unless it contains a run that was cut off and can continue. Call ``add`` for each frame, then
+    ``close``. A frame whose number is already stored replaces the stored frame and all later frames.
     """
 
     def __init__(self, folder: Path, identity: RunJson, rest: AtRest = NOTHING, *, anew: bool = False) -> None:
-        """Begin a run of an ``identity``, the first keys of run.json; ``anew`` if its solver cannot continue a stored run."""
+        """Begin a run. ``identity``: the first keys of run.json. ``rest``: shapes at rest. ``anew``: ignore a stored run."""
         self.folder, self.rest = folder, rest
         self.state: RunJson = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
         self.state |= {"scalars": {}, "residuals": [], "cost": {}, "parts": []}
@@ -115,7 +123,7 @@ class Writer:
 
     @property
     def cut_off(self) -> CutOff:
-        """The stored part of the run, for a solver that can continue it."""
+        """The stored part of the run, for a solver that supports continuation."""
         return CutOff(self.folder / RESTART, self.frames)
 
     @property
@@ -124,7 +132,7 @@ class Writer:
         return tuple(self.state["numbers"])
 
     def add(self, frame: Frame) -> None:
-        """Store a frame: its files first, then the index files and run.json."""
+        """Store a frame: first its files, then the index files and run.json."""
         truncate(self.state, frame.number)
         parts: dict[str, Callable[[Path], None]] = {}
         surface, lines, mesh = self.rest.surface, self.rest.fibres, self.rest.mesh
@@ -150,14 +158,14 @@ class Writer:
             write(self.folder / names[-1][1])
             files.write_pvd(self.folder / f"{part}.pvd", names)
         for name, value in (dict.fromkeys(self.state["scalars"], math.nan) | frame.scalars).items():
-            # Unknown in frames that were stored before an effect was added.
+            # A scalar that earlier frames do not have is unknown there, for example if an effect has been added.
             unknown: list[float | None] = [None] * (len(self.state["numbers"]) - 1)
             self.state["scalars"].setdefault(name, unknown).append(value if math.isfinite(value) else None)
         self._write_state()
         self._log_progress(frame)
 
     def close(self, outcome: Outcome, **origin: Any) -> None:
-        """Store the outcome, and further facts on the ``origin``."""
+        """Store the outcome, and further entries of the provenance, ``origin``."""
         self.state["origin"] |= origin
         cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
         self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
@@ -166,7 +174,7 @@ class Writer:
             clear(self.folder)
 
     def _write_unknowns(self, frame: Frame) -> bool:
-        """Write the unknowns of the tets; False if the frame has none."""
+        """Write the unknowns of the tetrahedra. Returns False if the frame has none."""
         if self.rest.mesh is None or frame.state is None:
             return False
         if not self.frames:
@@ -175,7 +183,7 @@ class Writer:
         return True
 
     def _write_rest(self) -> None:
-        """Write the rest state, which is not the first frame of a solver without a surface."""
+        """Write the rest state, which the frames of a solver without a surface do not contain."""
         (self.folder / "rest").mkdir(exist_ok=True)
         surface, fibres = self.rest.surface, self.rest.fibres
         files.write_surface(self.folder / "rest" / "surface.vtp", surface, surface.points)

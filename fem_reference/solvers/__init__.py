@@ -1,7 +1,7 @@
-"""Solvers: one file or folder each, named as in scene files.
+"""Solvers. Each solver is a file or a folder, with the name that scene files use.
 
-A file lists its offers in ``SOLVES``: a ``MuscleSolver``, a ``FieldSolver``, a ``BodySolver``, or several of them
-(``common.protocol``; the contract is tests/contracts/test_every_solver.py).
+The file lists in ``SOLVES`` what it offers: a ``MuscleSolver``, a ``FieldSolver``, a ``BodySolver``, or several of them
+(see ``common.protocol``). tests/contracts/test_every_solver.py tests the contract that every solver fulfils.
 """
 
 import importlib
@@ -19,14 +19,14 @@ __all__ = ["check", "choice", "find", "in_table", "names", "offers", "settings",
 
 
 def names(task: Task | None = None) -> list[str]:
-    """The names of all solvers that a scene file may choose, or only of those for a ``task``."""
-    # The folder common and the modules of kernels serve solvers and are not solvers themselves.
+    """The names of the solvers that a scene file may choose: all of them, or only the solvers for a ``task``."""
+    # The folder ``common`` and the modules with kernels contain code for solvers and are not solvers themselves.
     found = [name for name in modules.names(__path__) if name != "common" and not name.endswith("_kernels")]
     return [name for name in found if task is None or any(offer.task == task for offer in offers(name))]
 
 
 def offers(name: str) -> tuple[Solver[Any, Any], ...]:
-    """The offers of the solver ``name``, one for each task; TypeError if its file has no valid ``SOLVES``."""
+    """The entries of ``SOLVES`` of the solver ``name``, one for each task. Raises TypeError if ``SOLVES`` is missing or invalid."""
     found = vars(importlib.import_module(f"{__name__}.{name}")).get("SOLVES")
     if not isinstance(found, tuple) or not found or not all(isinstance(offer, Solver) for offer in found):
         want = "a tuple of MuscleSolver, FieldSolver or BodySolver (solvers/common/protocol.py)"
@@ -43,7 +43,7 @@ def find(name: str, place: str, task: Literal["solve_body"]) -> BodySolver[Any]:
 @overload
 def find(name: str, place: str, task: Task) -> Solver[Any, Any]: ...
 def find(name: str, place: str, task: Task = "solve") -> Solver[Any, Any]:
-    """The solver ``name`` for a ``task``; InputError at ``place`` if there is none."""
+    """The solver ``name`` for a ``task``. Raises InputError at ``place`` if there is no such solver."""
     if name not in names():
         raise InputError(join(place, "solver"), f'"{name}"', f"one of {', '.join(names(task))}")
     for offer in offers(name):
@@ -55,7 +55,7 @@ def find(name: str, place: str, task: Task = "solve") -> Solver[Any, Any]:
 
 
 def in_table(kind: str | None = None) -> tuple[Candidate, ...]:
-    """The candidates that solvers offer for the page table-5-1: all, or those of one ``kind`` in the report's Table 5.1."""
+    """The candidates on the page table-5-1: all of them, or only those of one ``kind`` of method in the report's Table 5.1."""
     return tuple(
         Candidate(name=row.name, solver=name, **row.settings)
         for name in names("solve")
@@ -65,7 +65,10 @@ def in_table(kind: str | None = None) -> tuple[Candidate, ...]:
 
 
 def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
-    """The name and settings of a run by ``name``, a solver or candidate: from the case, else from table-5-1, else the defaults."""
+    """The name of a run, and the solver with its settings, that belong to ``name``, the name of a candidate or of a solver.
+
+    The settings are from the candidates of the case; otherwise, for a muscle, from table-5-1; otherwise they are the defaults.
+    """
     own = [one for one in case.candidate if one.solver == name] + [one for one in case.candidate if one.name == name]
     table = [one for one in in_table() if one.solver == name and case.task == "solve"]
     for one in (*own, *table):
@@ -74,18 +77,21 @@ def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
 
 
 def takes_effects(name: str) -> bool:
-    """True if the solver ``name`` simulates the effects of a scene."""
+    """True if the solver ``name`` models the effects of a scene."""
     return any(isinstance(offer, MuscleSolver) and offer.check_effects is not None for offer in offers(name))
 
 
 def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str, task: Task = "solve") -> None:
-    """Raise InputError below ``place`` if the solver ``name`` with these ``settings`` does not accept the ``effects``."""
+    """Raise InputError, with a key inside ``place``, if the solver ``name`` with these ``settings`` does not accept the effects."""
     offer = find(name, place, task)
     if isinstance(offer, MuscleSolver) and offer.check_effects is not None:
         offer.check_effects(settings, effects, place)
 
 
 def settings(choice: SolverChoice, place: str, task: Task = "solve") -> Record:
-    """The settings in ``choice``, parsed into the record of its solver; InputError below ``place`` if they are invalid."""
+    """The settings in ``choice``, parsed into the record that its solver defines.
+
+    Raises InputError, with a key inside ``place``, if the settings are invalid.
+    """
     record: type[Record] = find(choice.solver, place, task).record(choice.settings, place)
     return parse(record, choice.settings, place)

@@ -1,10 +1,11 @@
-"""ARAP, as rigid as possible: the edges around every vertex keep their shape. Report section 5.5.2; Sorkine and Alexa 2007.
+"""Muscle surfaces deformed as rigidly as possible (ARAP). Report section 5.5.2; Sorkine and Alexa 2007.
 
-Frame number n is the state with the bones in their pose of frame n. Attached vertices move with their bone exactly. From the
-previous state, the method alternates between the rotations of all cells (local step) and the positions of free vertices (global
-step). If the rows of attached vertices are removed and the weight of an edge is the same from both ends, both steps minimise eq.
-5.10, each over its own unknowns, so the energy never rises. Negative weights do not change this, as the matrix is still the
-positive stiffness matrix of linear elements. Attachments by springs are treated as exact, and there is no contact.
+The edges around each vertex form a cell, which is rotated with as little distortion as possible. Frame number n is the state in
+which the bones have their pose of frame n; attached vertices move exactly with their bone. Starting from the previous state, the
+method alternates between the rotations of all cells (local step) and the positions of the free vertices (global step). If the rows
+of attached vertices are removed and an edge has the same weight at both ends, each step minimises eq. 5.10 over its unknowns, so
+the energy never rises. This also holds with negative weights, because the matrix is still the positive stiffness matrix of linear
+elements. Attachments by springs are treated as exact, and there is no contact.
 """
 
 from collections.abc import Callable
@@ -31,22 +32,23 @@ Symmetric = Literal["cotangent", "clamped cotangent", "kirchhoff"]
 Weights = Literal[Symmetric, "tutte"]
 Fixed = Literal["remove", "ols"]
 
-# A triangle counts as degenerate if its height is at most this fraction of its longest side.
+# A triangle is degenerate if its height is at most this fraction of its longest side.
 _NO_AREA = 1e-6
 
 
 class ArapSettings(Record):
-    """Settings of the alternation of local and global steps; every key except ``tolerance`` is required.
+    """Settings of the iteration of local and global steps; every key except ``tolerance`` is required.
 
-    ``weights`` of edges: "cotangent" (eq. 5.13), "clamped cotangent" (negative weights set to 0), "kirchhoff" (all 1), "tutte"
-    (kirchhoff, each row divided by its diagonal). A cotangent weight is negative if the angles opposite its edge sum to more than
-    pi. With negative weights, as in libigl, a half turn of a cell may lower the energy: the rest state is unstable. ``fixed``: rows
-    and columns of attached vertices are removed ("remove"), or only the columns are removed and all rows are solved by least
-    squares ("ols", eq. 5.12). With removed rows, tutte gives the same states as kirchhoff. ``rotations`` are fitted before "each"
-    global step, or once per frame ("first only"), in which case later iterations change nothing. ``volume_step``: after each
-    global step the free vertices are scaled by eq. 5.9 about the mean of all vertices. ``iterations``: the number per frame, exact
-    without a ``tolerance`` and otherwise the maximum. With a ``tolerance`` [mm] a frame ends as soon as no vertex moves farther
-    than this in an iteration; if a frame does not meet it within ``iterations``, the run ends ``out of steps``.
+    ``weights``: the weights of edges, "cotangent" (eq. 5.13), "clamped cotangent" (negative weights set to 0), "kirchhoff" (all 1)
+    or "tutte" (kirchhoff, with each row divided by its diagonal). A cotangent weight is negative if the two angles opposite the
+    edge sum to more than pi. With negative weights, as in libigl, rotating a cell by 180 degrees may lower the energy, so the rest
+    state is unstable. ``fixed``: the treatment of attached vertices, "remove" (their rows and columns are removed) or "ols" (only
+    their columns are removed, and all rows are solved by least squares, eq. 5.12). With "remove", tutte weights give the same
+    states as kirchhoff weights. ``rotations``: fitted before "each" global step, or once per frame ("first only"), in which case
+    later iterations change nothing. ``volume_step``: after each global step, the free vertices are scaled by eq. 5.9 about the
+    mean of all vertices. ``iterations``: the number per frame, or the maximum if there is a ``tolerance``. ``tolerance`` [mm]: a
+    frame ends when no vertex moves farther than this in an iteration; if some frame needs more than ``iterations``, the run ends
+    ``out of steps``.
     """
 
     weights: Weights
@@ -58,31 +60,32 @@ class ArapSettings(Record):
 
 
 def cells_of(surface: Surface, weights: Weights) -> VertexCells:
-    """The cells of a closed surface with ``weights`` named as in the settings."""
+    """The cells of a closed surface, with the edge ``weights`` that the settings name."""
     matrix = _edge_weights(surface, weights)
     starts, neighbours = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
     return VertexCells(np.array(surface.points), starts, neighbours, matrix.data)  # compiled code needs writable arrays
 
 
 def laplacian(cells: VertexCells) -> Any:
-    """The sparse matrix L (n, n) of ``L p' = b``: minus the matrix of the report's Figure 5.5."""
+    """The sparse matrix L (n, n) of ``L p' = b``, which is the negative of the matrix in the report's Figure 5.5."""
     count = len(cells.rest)
     matrix = sparse.csr_array((cells.weights, cells.neighbours, cells.starts), shape=(count, count))
     return sparse.diags_array(matrix.sum(axis=1)) - matrix
 
 
 def least_energy(points: Floats, cells: VertexCells) -> float:
-    """Eq. 5.10 with squared norms [mm2], at the rotations that fit ``points`` (n, 3) best."""
+    """The energy [mm2] of eq. 5.10, with squared norms, at ``points`` (n, 3) and the rotations that minimise it."""
     return energy(points, fit_rotations(points, cells), cells)
 
 
 @dataclass(frozen=True, eq=False)
 class GlobalStep:
-    """The global step for given ``attached`` (k,) and ``free`` vertices (m,), factorised once.
+    """The global step for given ``attached`` (k,) and ``free`` vertices (m,), with a matrix that is factorised once.
 
-    ``pick`` (m, n) multiplies both sides: it selects the rows of free vertices or, for least squares, is the transpose of their
-    columns. ``coupling`` (m, k): the columns of attached vertices, also multiplied. ``loose``: free vertices that no weights
-    connect to an attached vertex. ``factor``: None if there are loose, no attached or no free vertices; no vertex moves then.
+    ``pick`` (m, n): the matrix by which both sides are multiplied. It selects the rows of free vertices or, for least squares, is
+    the transpose of their columns. ``coupling`` (m, k): ``pick`` times the columns of attached vertices. ``loose``: free vertices
+    that are not connected to an attached vertex by nonzero weights. ``factor``: the LU factors, or None if there are loose
+    vertices, no attached vertices or no free vertices; no vertex moves then.
     """
 
     cells: VertexCells
@@ -95,7 +98,7 @@ class GlobalStep:
 
     @classmethod
     def of(cls, cells: VertexCells, attached: Ints, fixed: Fixed) -> Self:
-        """The system with the rows of attached vertices removed, or kept for least squares."""
+        """The global step of ``cells``; ``fixed`` is the treatment of ``attached`` vertices, as in the settings."""
         everything, matrix = np.arange(len(cells.rest)), laplacian(cells).tocsr()
         free = np.setdiff1d(everything, attached)
         columns, part = matrix[:, free], connected_components(matrix != 0, directed=False)[1]
@@ -106,7 +109,7 @@ class GlobalStep:
         return cls(cells, attached, free, pick, pick @ matrix[:, attached], factor, loose)
 
     def place(self, points: Floats, rotations: Floats) -> Floats:
-        """The global step: positions (n, 3) [mm] that solve ``L p' = b`` with the attached vertices as in ``points``."""
+        """Positions (n, 3) [mm] that solve ``L p' = b`` for given ``rotations``; attached vertices stay as in ``points``."""
         moved = points.copy()
         if self.factor is not None:
             right = self.pick @ right_side(rotations, self.cells) - self.coupling @ points[self.attached]
@@ -116,7 +119,10 @@ class GlobalStep:
 
 @dataclass(frozen=True, eq=False)
 class Relaxed:
-    """The ``points`` (n, 3) [mm] of a frame after ``iterations``; ``met``: False if a tolerance is missed; ``trouble``, if any."""
+    """The ``points`` (n, 3) [mm] of a frame after ``iterations``.
+
+    ``met``: False if a tolerance was given and not reached. ``trouble``: the reason to end the run, or None.
+    """
 
     points: Floats
     iterations: int
@@ -125,7 +131,7 @@ class Relaxed:
 
 
 class Alternation(MovingSurface):
-    """A surface whose free vertices are moved by ``relax`` after the attached vertices have moved."""
+    """A surface whose free vertices are moved by the function ``relax`` after the attached vertices have moved with their bones."""
 
     advice = "a slower motion may help"
 
@@ -135,7 +141,7 @@ class Alternation(MovingSurface):
         self.cost |= {"local_global_steps": 0, "frames_off_tolerance": 0}
 
     def move(self, number: int) -> None:
-        """Carry the attached vertices to frame ``number``, and relax the others."""
+        """Move the attached vertices to their positions at frame ``number``, then relax the free vertices."""
         carry(self.points, self.setup, number)
         self.relaxed = self.relax(self.points)
         self.points = self.relaxed.points
@@ -143,16 +149,16 @@ class Alternation(MovingSurface):
         self.cost["frames_off_tolerance"] += not self.relaxed.met
 
     def trouble(self) -> Trouble | None:
-        """The trouble with the surface, or with its relaxation."""
+        """The trouble with the surface or with its relaxation; None if there is none."""
         return super().trouble() or self.relaxed.trouble
 
     def frame(self, number: int) -> Frame:
-        """The surface and its energy."""
+        """The surface at frame ``number``, with its energy as a scalar."""
         energy = least_energy(self.points, self.system.cells)
         return replace(super().frame(number), scalars={"arap_energy_mm2": energy})
 
     def ending(self) -> Outcome:
-        """Out of steps if a frame did not meet the tolerance."""
+        """The outcome: *converged*, or *out of steps* if some frame did not meet the tolerance."""
         frames = self.setup.frames[-1] - self.setup.frames[0]
         done = f"{frames} frames in {self.cost['local_global_steps']:.0f} iterations"
         if missed := self.cost["frames_off_tolerance"]:
@@ -162,7 +168,7 @@ class Alternation(MovingSurface):
 
 
 def solve(setup: Setup, settings: ArapSettings, sink: Sink) -> Outcome:
-    """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
+    """Go through every frame number, from the first of ``setup.frames``, which is at rest, to the last."""
     return alternate(_alternation, setup, settings, sink)
 
 
@@ -187,7 +193,7 @@ def _alternation(setup: Setup, settings: ArapSettings) -> Alternation:
 
 
 def alternate[S: Record](make: Callable[[Setup, S], Alternation], setup: Setup, settings: S, sink: Sink) -> Outcome:
-    """Move the attached vertices and relax the others, frame number by frame number."""
+    """Move the attached vertices and relax the free vertices at each frame number, with the model that ``make`` creates."""
     model = timed(make, setup, settings)
     if len(loose := model.system.loose):
         why = f"vertex {loose[0]}: only triangles without area or weight connect it to an attached vertex"
@@ -197,8 +203,10 @@ def alternate[S: Record](make: Callable[[Setup, S], Alternation], setup: Setup, 
 
 
 def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:
-    """``points`` (n, 3) with the ``free`` points scaled about the mean of all by the cube root of V0 / V, eq. 5.9. V0 is ``volume``
-    [mm3], reached only if all vertices are free, as attached vertices stay in place. A surface without volume is not changed.
+    """``points`` (n, 3) after the ``free`` points are scaled about the mean of all points by the cube root of V0 / V (eq. 5.9).
+
+    V0 is ``volume`` [mm3]. Attached vertices stay in place, so the result has this volume only if all vertices are free. A surface
+    that encloses no volume is returned unchanged.
     """
     centre, inside = points.mean(axis=0), abs(enclosed_volume(points, triangles))
     factor = np.cbrt(volume / inside) if inside > 0 else 1.0
@@ -208,18 +216,18 @@ def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats
 
 
 def farthest(displacements: Floats) -> float:
-    """The maximum length of ``displacements`` (n, 3)."""
+    """The length of the longest of the ``displacements`` (n, 3)."""
     return float(np.sqrt(np.max(np.einsum("ij,ij->i", displacements, displacements))))
 
 
 def factorised(matrix: Any) -> Any:
-    """The LU factors of a sparse matrix of symmetric structure whose diagonal needs no pivoting."""
+    """The LU factors of a sparse matrix that has a symmetric structure and needs no pivoting."""
     options = {"SymmetricMode": True}
     return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 
 
 def cotangents(points: Floats, triangles: Ints) -> Floats:
-    """Cotangent of the angle at each corner (m, 3), negative if the angle is obtuse; 0 in a degenerate triangle."""
+    """The cotangent (m, 3) of the angle at each corner: negative if the angle is obtuse, and 0 in a degenerate triangle."""
     sides = [points[triangles[:, (k + 2) % 3]] - points[triangles[:, (k + 1) % 3]] for k in range(3)]
     doubled = np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)
     longest = np.max([np.einsum("ij,ij->i", side, side) for side in sides], axis=0)
@@ -229,7 +237,7 @@ def cotangents(points: Floats, triangles: Ints) -> Floats:
 
 
 def _edge_weights(surface: Surface, name: Weights) -> Any:
-    """The weight of each edge from either end, a sparse matrix (n, n)."""
+    """A sparse matrix (n, n) with two weights for each edge, one for each end."""
     triangles, count = surface.triangles, len(surface.points)
     one, other = triangles[:, [1, 2, 0]].ravel(), triangles[:, [2, 0, 1]].ravel()  # ends of the edge opposite a corner
     ends = (np.concatenate([one, other]), np.concatenate([other, one]))
@@ -246,6 +254,6 @@ def _edge_weights(surface: Surface, name: Weights) -> Any:
 
 _REPORTED = {"weights": "clamped cotangent", "fixed": "remove", "rotations": "each", "volume_step": False}
 _REPORTED |= {"iterations": 4}
-# The second row includes the volume step, eq. 5.9, in each iteration (section 6.2).
+# The second row adds the volume step (eq. 5.9) to each iteration (section 6.2).
 _TABLE = (TableRow("ARAP", "arap", _REPORTED), TableRow("ARAP", "arap_volume_step", _REPORTED | {"volume_step": True}))
 SOLVES = (MuscleSolver(settings=ArapSettings, solve=solve, example=_REPORTED | {"iterations": 3}, table=_TABLE),)

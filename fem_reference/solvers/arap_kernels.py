@@ -1,6 +1,6 @@
-"""The local step, the right-hand side and the energy of as-rigid-as-possible deformation, compiled. Report eq. 5.10 and 5.11.
+"""Compiled functions for as-rigid-as-possible deformation: local step, right-hand side and energy. Report eq. 5.10 and 5.11.
 
-Arrays are ``points`` (n, 3) [mm] and ``rotations`` (n, 3, 3), writable and C-contiguous.
+The arguments ``points`` (n, 3) [mm] and ``rotations`` (n, 3, 3) should be writable and C-contiguous arrays.
 """
 
 import math
@@ -11,14 +11,17 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.solvers.compiled_kernels import compiled
 
-# Sweeps over a symmetric 4 x 4 matrix; it is diagonal to rounding after about five, as convergence is quadratic.
+# The maximum number of Jacobi sweeps over a symmetric 4 x 4 matrix. Convergence is quadratic: about five make it diagonal.
 _SWEEPS = 30
 _ROUNDING = 1e-17
 
 
 class VertexCells(NamedTuple):
-    """The edges around each vertex i at ``rest`` (n, 3) [mm]: to ``neighbours[starts[i]:starts[i + 1]]``, with their ``weights``,
-    which may differ between the two ends; ``starts`` (n + 1,), ``neighbours`` and ``weights`` (e,).
+    """The cells of a surface: for each vertex, the edges to its neighbours.
+
+    ``rest`` (n, 3) [mm]: the vertices at rest. The edges from vertex i lead to ``neighbours[starts[i]:starts[i + 1]]``, and
+    ``weights`` has their weights in the same order; an edge may have different weights at its two ends. ``starts`` (n + 1,),
+    ``neighbours`` and ``weights`` (e,).
     """
 
     rest: Floats
@@ -29,7 +32,10 @@ class VertexCells(NamedTuple):
 
 @compiled
 def _turn(matrix: Floats, vectors: Floats, p: int, q: int) -> None:
-    """Rotate rows and columns p, q of the symmetric ``matrix`` (4, 4) to make [p, q] 0, and columns p, q of ``vectors`` alike."""
+    """Rotate rows and columns p, q of a symmetric ``matrix`` (4, 4), so that its entry [p, q] becomes 0.
+
+    The columns p, q of ``vectors`` (4, 4) are rotated in the same way.
+    """
     slope = 0.5 * (matrix[q, q] - matrix[p, p]) / matrix[p, q]
     tangent = math.copysign(1.0, slope) / (abs(slope) + math.sqrt(slope * slope + 1))
     c = 1 / math.sqrt(tangent * tangent + 1)
@@ -45,7 +51,7 @@ def _turn(matrix: Floats, vectors: Floats, p: int, q: int) -> None:
 
 @compiled
 def _diagonalise(matrix: Floats, vectors: Floats) -> None:
-    """Make the symmetric ``matrix`` (4, 4) diagonal by Jacobi rotations; the columns of ``vectors`` become its eigenvectors."""
+    """Diagonalise a symmetric ``matrix`` (4, 4) in place by Jacobi rotations; the columns of ``vectors`` become eigenvectors."""
     vectors[:] = 0.0
     for k in range(4):
         vectors[k, k] = 1.0
@@ -62,11 +68,11 @@ def _diagonalise(matrix: Floats, vectors: Floats) -> None:
 
 @compiled
 def _rotate(covariance: Floats, matrix: Floats, vectors: Floats, rotation: Floats) -> None:
-    """The ``rotation`` R (3, 3), det R = 1, that maximises sum_ab R_ab C_ba; ``matrix`` and ``vectors`` (4, 4) are scratch.
+    """Compute the ``rotation`` R (3, 3), with det R = 1, that maximises sum_ab R_ab C_ba for the ``covariance`` C (3, 3).
 
-    As a quaternion the rotation is the eigenvector of the largest eigenvalue of a 4 x 4 matrix made of C (Horn 1987,
+    The quaternion of R is the eigenvector for the largest eigenvalue of a 4 x 4 matrix that is formed from C (Horn 1987,
     doi:10.1364/JOSAA.4.000629). The report's singular value decomposition gives the same rotation, except in cells that are flat or
-    inside out, for which it gives a reflection.
+    inside out, where it gives a reflection. ``matrix`` and ``vectors`` (4, 4) are work arrays.
     """
     C = covariance
     matrix[0, 0] = C[0, 0] + C[1, 1] + C[2, 2]
@@ -88,10 +94,10 @@ def _rotate(covariance: Floats, matrix: Floats, vectors: Floats, rotation: Float
 
 @compiled
 def fit_rotations(points: Floats, cells: VertexCells) -> Floats:
-    """The rotations (n, 3, 3) of the cells that bring their edges at rest nearest to the edges of ``points``.
+    """The rotations (n, 3, 3) that map the edges of each cell at rest to the edges between ``points``, fitted by least squares.
 
-    The covariance is ``C = sum_j w_ij (p_i - p_j) (p'_i - p'_j)^T``: edges start at the vertex itself, as in Sorkine and
-    Alexa 2007; if they started at the centroid, as in the report's text, the fit would not minimise eq. 5.10.
+    The covariance is ``C = sum_j w_ij (p_i - p_j) (p'_i - p'_j)^T``, in which edges start at the vertex i, as in Sorkine and
+    Alexa 2007. With edges from the centroid of the cell, as in the report's text, the fit would not minimise eq. 5.10.
     """
     rotations = np.empty((len(points), 3, 3))
     covariance, matrix, vectors = np.empty((3, 3)), np.empty((4, 4)), np.empty((4, 4))
@@ -109,7 +115,7 @@ def fit_rotations(points: Floats, cells: VertexCells) -> Floats:
 
 @compiled
 def right_side(rotations: Floats, cells: VertexCells) -> Floats:
-    """``b_i = sum_j w_ij / 2 (R_i + R_j) (p_i - p_j)`` (n, 3) [mm]. Eq. 5.11."""
+    """The right-hand side ``b_i = sum_j w_ij / 2 (R_i + R_j) (p_i - p_j)`` (n, 3) [mm] of eq. 5.11."""
     found = np.zeros_like(cells.rest)
     for i in range(len(cells.rest)):
         for at in range(cells.starts[i], cells.starts[i + 1]):
@@ -123,7 +129,10 @@ def right_side(rotations: Floats, cells: VertexCells) -> Floats:
 
 @compiled
 def energy(points: Floats, rotations: Floats, cells: VertexCells) -> float:
-    """``sum_i sum_j w_ij |(p'_i - p'_j) - R_i (p_i - p_j)|^2`` [mm2]: eq. 5.10 with squared norms, as in Sorkine and Alexa 2007."""
+    """The energy ``sum_i sum_j w_ij |(p'_i - p'_j) - R_i (p_i - p_j)|^2`` [mm2].
+
+    This is eq. 5.10 with squared norms, as in Sorkine and Alexa 2007.
+    """
     found = 0.0
     for i in range(len(cells.rest)):
         for at in range(cells.starts[i], cells.starts[i + 1]):

@@ -1,10 +1,10 @@
-"""ARAP (as rigid as possible) with position based dynamics: the two combinations that report sections 6.2 and 7.2 propose.
+"""ARAP (as rigid as possible) combined with position based dynamics in the two ways that report sections 6.2 and 7.2 propose.
 
-*The volume as a constraint* of the ARAP energy, instead of a scaling after each step: the positions of a global step solve
-``L p' = b + lambda grad V``. The gradient is taken at the previous iteration, and the multiplier lambda is chosen so that the
-enclosed volume is the volume at rest. At convergence, the gradient of the energy is a multiple of the gradient of the volume. *ARAP
-as initial guess*: sweeps of PBD's projections (edge lengths, volume, dihedral angles) start from the ARAP state of the frame; there
-are no velocities. If both are requested, the projections come last. As in ``arap``, there is no contact.
+*Volume constraint*: the ARAP energy is minimised at constant volume, instead of scaling the surface after each step. The positions
+of a global step solve ``L p' = b + lambda grad V``, with the gradient of the volume at the previous iteration and a multiplier
+lambda for which the enclosed volume is the volume at rest. At convergence, the gradient of the energy is a multiple of the gradient
+of the volume. *Initial guess*: sweeps of PBD's projections (edge lengths, volume, dihedral angles) start from the ARAP state of the
+frame, without velocities. If both are requested, the projections come last. As in ``arap``, there is no contact.
 """
 
 from typing import Annotated
@@ -26,14 +26,17 @@ from fem_reference.solvers.pbd_kernels import volume
 
 # Newton's method for the volume stops at this relative error, or after this many steps.
 _REACHED, _STEPS = 1e-12, 20
-# A root counts as real if its imaginary part is at most this fraction of its magnitude.
+# A root is taken to be real if its imaginary part is at most this fraction of its magnitude.
 _REAL = 1e-8
-# The volume counts as preserved up to this relative error.
+# The volume counts as preserved if its relative error is at most this value.
 _KEPT = 1e-6
 
 
 class Projections(Record):
-    """Projections of PBD after ARAP: the number of ``sweeps`` over all constraints, and stiffnesses as in ``pbd``."""
+    """Projections of PBD that follow ARAP.
+
+    ``sweeps``: the number of sweeps over all constraints. ``stretch``, ``volume``, ``bending``: stiffnesses as in ``pbd``.
+    """
 
     sweeps: Annotated[int, Field(gt=0)]
     stretch: Stiffness
@@ -42,11 +45,12 @@ class Projections(Record):
 
 
 class ArapPbdSettings(Record):
-    """Settings of ARAP with preserved volume; rows of attached vertices are removed, and each iteration fits the rotations.
+    """Settings of ARAP with a volume constraint or projections. Rows of attached vertices are removed, as with fixed = "remove" in
+    ``arap``, and rotations are fitted in each iteration.
 
-    ``weights``, ``iterations`` and ``tolerance``: as in ``arap``; "tutte" is not offered, because it gives the same states as
-    "kirchhoff" once rows are removed. ``volume_constraint``: minimise the energy at the rest volume.
-    ``projections``: PBD after ARAP, or none.
+    ``weights``, ``iterations`` and ``tolerance``: as in ``arap``. The weights "tutte" are not offered, because with removed rows
+    they give the same states as "kirchhoff". ``volume_constraint``: minimise the energy at the rest volume. ``projections``: the
+    projections of PBD that follow ARAP; by default there are none.
     """
 
     weights: Symmetric
@@ -62,7 +66,7 @@ class ArapPbdSettings(Record):
 
 
 def solve(setup: Setup, settings: ArapPbdSettings, sink: Sink) -> Outcome:
-    """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
+    """Go through every frame number, from the first of ``setup.frames``, which is at rest, to the last."""
     return alternate(_alternation, setup, settings, sink)
 
 
@@ -80,9 +84,11 @@ def _alternation(setup: Setup, settings: ArapPbdSettings) -> Alternation:
 
 
 def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest: PbdConstraints) -> Relaxed:
-    """Alternate local and global steps from ``points`` (n, 3), at the volume of ``rest`` if ``volume_constraint`` is set.
-    Diverged if the volume constraint moves a point from the minimum of a global step by more than the edge of a cube of that
-    volume: the volume is then preserved only by folds, at another root of the cubic.
+    """Alternate local and global steps, starting from ``points`` (n, 3) [mm].
+
+    With ``volume_constraint``, each iteration ends at the volume of ``rest``. The status is *diverged* if this constraint moves a
+    point farther from the unconstrained minimum than the edge length of a cube of that volume: the volume is then preserved only by
+    folds of the surface, at a wrong root of the cubic.
     """
     count, met, tolerance = 0, False, settings.tolerance
     while count < settings.iterations and not met:
@@ -100,10 +106,10 @@ def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest
 
 
 def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdConstraints) -> Floats:
-    """``p + lambda L^-1 grad V``, with the lambda nearest to 0 at which the volume equals the volume of ``rest``.
+    """The positions ``p + lambda L^-1 grad V`` (n, 3) [mm], with the lambda nearest to 0 that gives the volume of ``rest``.
 
-    p is the ``minimum`` (n, 3) of the global step, and the gradient is taken at the positions ``before`` that step. The volume is a
-    cubic polynomial of lambda; Newton's method refines the root nearest to 0. Without a root the minimum is returned.
+    p is the ``minimum`` (n, 3) of the global step, and the gradient is evaluated at the positions ``before`` (n, 3) that step. The
+    volume is a cubic polynomial in lambda; Newton's method refines the root nearest to 0. Without a root, p is returned.
     """
     direction = np.zeros_like(minimum)
     if system.factor is None:
@@ -122,10 +128,11 @@ def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdCons
 
 
 def least_root(points: Floats, direction: Floats, rest: PbdConstraints) -> float | None:
-    """The lambda nearest to 0 at which ``points + lambda direction`` (n, 3) have the volume of ``rest``, None if there is none.
+    """The lambda nearest to 0 for which ``points + lambda direction`` (n, 3) have the volume of ``rest``; None if there is none.
 
-    Six times the volume is a cubic form, so values and slopes at ``points`` and at ``direction`` give the coefficients in lambda.
-    The cubic is solved for ``1 / lambda``, which stays accurate if the cubic term nearly vanishes.
+    Six times the volume is a cubic form of the positions. Therefore its values and gradients at ``points`` and at ``direction``
+    give the coefficients of the cubic in lambda. The cubic is solved for ``1 / lambda``, which is accurate even if the cubic term
+    nearly vanishes.
     """
     (value, slope), (cubic, slope_of_direction) = volume(points, rest.triangles), volume(direction, rest.triangles)
     off = value - rest.six_volumes
@@ -140,7 +147,7 @@ def least_root(points: Floats, direction: Floats, rest: PbdConstraints) -> float
 
 
 def projected(points: Floats, rest: PbdConstraints, projections: Projections) -> Floats:
-    """``points`` (n, 3) after the sweeps of PBD's projections."""
+    """The positions (n, 3) [mm] after sweeps of PBD's projections, which start from ``points`` (n, 3)."""
     moved = points.copy()
     for _ in range(projections.sweeps):
         sweep(moved, rest, projections.stretch, projections.volume, projections.bending)

@@ -1,9 +1,9 @@
 """Contact of vertices with bones, as constraints ``C = distance - allowed >= 0``. Report section 6.1.1.
 
-The distance to a bone is computed only for vertices that may be near the bone. A distance changes by at most the displacement, so a
-vertex whose displacement relative to the bone is less than its last distance is still outside. Only vertices are checked, at their
-new positions and not along their paths: a sharp edge may pass between them, and a vertex that crosses a thin bone in one step ends
-on the other side. The distance to a bone of triangles is stored on a grid aligned with the axes at rest, so results depend on the
+The distance to a bone is computed only for vertices that may be near the bone: a vertex whose displacement relative to the bone,
+since the last check, is less than its distance at that check is still outside. Only vertices are checked, and only at their new
+positions. Therefore a sharp edge of a bone may pass between vertices, and a vertex that crosses a thin bone in one step ends on the
+other side. The distance to a bone made of triangles is stored on a grid aligned with the axes at rest, so results depend on the
 axes: if the entire scene is rotated, vertices in the case hip_flexion with ``pbd`` differ by up to 1.2 mm (mean 0.1 mm).
 """
 
@@ -20,14 +20,14 @@ from fem_reference.problems.setup import Bone
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import Vector
 
-# Safety factor on distances: the gradient of a sampled distance has length 1 only within a few percent.
+# A safety factor on distances, as the length of the gradient of an interpolated distance differs from 1 by a few percent.
 _SURE = 0.9
 
 Four = tuple[float, float, float, float]
 
 
 class Contacts(NamedTuple):
-    """The checked vertices (k,), the values of their constraint (k,) [mm], and unit vectors (k, 3) along which they increase."""
+    """The checked ``vertices`` (k,), the ``value`` of each constraint (k,) [mm], and unit vectors ``away`` (k, 3) from the bone."""
 
     vertices: Ints
     value: Floats
@@ -36,7 +36,7 @@ class Contacts(NamedTuple):
 
 @compiled
 def _splines(t: float) -> tuple[Four, Four]:
-    """Values and slopes of the four cubic B-splines that are not zero in a cell, at ``t`` from 0 to 1 across the cell."""
+    """The values and the derivatives of the four cubic B-splines that are not zero in a cell, at ``t`` from 0 to 1 in the cell."""
     s = 1 - t
     values = (s * s * s / 6, (4 - 6 * t * t + 3 * t * t * t) / 6, (4 - 6 * s * s + 3 * s * s * s) / 6, t * t * t / 6)
     slopes = (-s * s / 2, (3 * t * t - 4 * t) / 2, (4 * s - 3 * s * s) / 2, t * t / 2)
@@ -45,14 +45,17 @@ def _splines(t: float) -> tuple[Four, Four]:
 
 @compiled
 def _cell(place: float, count: int) -> tuple[int, float]:
-    """The index of the cell that contains the position ``place`` [cells] on an axis of ``count`` nodes, and ``place`` within it."""
+    """The index of the cell that contains the position ``place`` [cells], and the position in this cell, from 0 to 1.
+
+    ``count``: the number of nodes along the axis.
+    """
     cell = min(int(place), count - 3)
     return cell, place - cell
 
 
 @compiled
 def _spline(coefficients: Floats, x: float, y: float, z: float) -> tuple[float, Vector]:
-    """Value and gradient of the spline at a position inside its grid, in cells from the grid's origin."""
+    """The value of a spline and its gradient [1/cells] at the position ``x``, ``y``, ``z`` [cells] from the grid's origin."""
     i, within_x = _cell(x, coefficients.shape[0])
     j, within_y = _cell(y, coefficients.shape[1])
     k, within_z = _cell(z, coefficients.shape[2])
@@ -76,7 +79,7 @@ def _spline(coefficients: Floats, x: float, y: float, z: float) -> tuple[float, 
 
 @compiled
 def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats) -> tuple[Floats, Floats]:
-    """Distance (n,) [mm] and gradient (n, 3) at ``points`` (n, 3), from the ``Grid`` with these coefficients."""
+    """The distance (n,) [mm] and its gradient (n, 3) at ``points`` (n, 3) [mm], interpolated by a ``Grid`` with these arguments."""
     distance, gradient = np.full(len(points), FAR), np.zeros_like(points)
     last_x, last_y, last_z = coefficients.shape[0] - 2, coefficients.shape[1] - 2, coefficients.shape[2] - 2
     for n in range(len(points)):
@@ -94,8 +97,10 @@ def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats)
 
 @compiled
 def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) -> tuple[Ints, Floats]:
-    """Indices (k,) and positions (k, 3) of the ``points`` (n, 3) that moved ``clear`` (n,) [mm] or more since the last check, when
-    they were at ``asked_at`` (n, 3). Returned positions and ``asked_at`` are in the rest frame of a bone that is now at ``pose``.
+    """The indices (k,) and positions (k, 3) [mm] of the points that have moved ``clear`` (n,) [mm] or more since their last check.
+
+    ``points`` (n, 3) [mm]: the present positions. ``pose`` (4, 4): the present pose of the bone. ``asked_at`` (n, 3) [mm]: the
+    positions at the last check. The returned positions and ``asked_at`` are in the frame of the bone at rest.
     """
     found, places = np.empty(len(points), np.int64), np.empty_like(points)
     count = 0
@@ -114,22 +119,25 @@ def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) ->
 
 
 class CollidingBone:
-    """A bone, its smallest ``allowed`` distance (n,) from each vertex, and the distances at the last check. The allowed distance is
-    ``gap`` [mm], or the distance at rest if less: nothing jumps at the first step. Vertices not ``free`` (n,) are never checked.
+    """A bone with which vertices collide.
+
+    ``allowed`` (n,) [mm]: the minimum distance of each vertex. This is ``gap`` [mm], or the distance at rest if that is smaller, so
+    that no vertex jumps in the first step. ``clear`` (n,) [mm]: the displacement after which a vertex is checked again. Vertices
+    that are not ``free`` (n,) are never checked.
     """
 
     def __init__(self, bone: Bone, rest: Floats, free: NDArray[np.bool_], gap: float) -> None:
         self.bone, shape = bone, bone.shape
         self.grid = shape if isinstance(shape, Grid) else None
         self.coefficients = np.array(shape.coefficients) if isinstance(shape, Grid) else np.zeros((0, 0, 0))
-        self.known_to = math.inf if self.grid is None else self.grid.margin  # beyond it a grid is coarse
+        self.known_to = math.inf if self.grid is None else self.grid.margin  # a grid is coarse at larger distances
         self.asked_at, self.clear = np.array(rest), np.where(free, 0.0, np.inf)
         distance, _ = self._sample(self.asked_at)
         self.allowed = np.minimum(distance, gap)
         self.pose = np.eye(4)
 
     def move(self, frame: float) -> None:
-        """Put the bone into its pose at ``frame``."""
+        """Move the bone to its pose at ``frame``."""
         self.pose = np.array(self.bone.pose(frame), np.float64)
 
     def near(self, points: Floats) -> Contacts:
@@ -144,7 +152,7 @@ class CollidingBone:
         return Contacts(vertices, distance - allowed, away @ self.pose[:3, :3].T)
 
     def watch(self, vertices: Ints) -> None:
-        """Include these ``vertices`` (k,) in the next check, wherever they are."""
+        """Include ``vertices`` (k,) in the next check, whatever their distance."""
         self.clear[vertices] = 0
 
     def _sample(self, places: Floats) -> tuple[Floats, Floats]:
@@ -155,16 +163,17 @@ class CollidingBone:
 
 
 def colliding_bones(bones: Sequence[Bone], rest: Floats, attached: Ints, gap: float) -> list[CollidingBone]:
-    """The ``bones`` with which points at ``rest`` (n, 3) [mm] collide, except the ``attached`` ones (k,)."""
+    """The ``bones``, with which all points at ``rest`` (n, 3) [mm] collide except the ``attached`` points (k,)."""
     free = np.ones(len(rest), bool)
     free[attached] = False
     return [CollidingBone(bone, rest, free, gap) for bone in bones]
 
 
 def move_out(points: Floats, bones: Sequence[CollidingBone], stiffness: float) -> None:
-    """Move ``points`` (n, 3) [mm] in place out of all bones, each by the sum of its displacements out of the bones that contain it.
+    """Move ``points`` (n, 3) [mm] in place out of all bones.
 
-    ``stiffness`` is the fraction of each displacement that is applied. Masses cancel, as each constraint has a single vertex.
+    A point that several bones contain moves by the sum of the displacements out of each. ``stiffness``: the fraction of each
+    displacement that is applied. Masses cancel, because each constraint has a single vertex.
     """
     moves = np.zeros_like(points)
     for one in bones:

@@ -1,8 +1,8 @@
-"""Your own solver as a command: it reads the scene from one folder and writes its frames into another folder.
+"""Your own solver as a command, which reads the scene from one folder and writes its frames into another folder.
 
-The command is started without a shell, once for each run. ``{scene}`` stands for the folder with the scene, as ``export`` writes
-it, ``{out}`` for an empty folder for the frames, and other names in braces for settings. A scene file cannot choose this solver, as
-it would run a program.
+The command is started once for each run, without a shell. ``{scene}`` stands for the folder with the scene, in the form that
+``export`` writes; ``{out}`` for an empty folder, into which the command writes its frames; and other names in braces for settings.
+A scene file cannot select this solver, because reading a scene must not start a program.
 """
 
 import hashlib
@@ -36,18 +36,18 @@ from fem_reference.solvers.common.protocol import Moves, MuscleSolver, Trade
 
 _PLACEHOLDER = re.compile(r"\{([A-Za-z]\w*)\}")
 FOLDERS = ("scene", "out")
-REFUSED = 77  # the exit status of a program that does not support a scene; Automake uses it for skipped tests
-# The code of a separate Python process: call a pickled function with the folders.
+REFUSED = 77  # the exit status of a program that does not support a scene, as for skipped tests in Automake
+# The code of a separate Python process, which calls a pickled function with the folders.
 _CALL = "import pathlib, pickle, sys; a = [*map(pathlib.Path, sys.argv[1:])]; pickle.loads(a[0].read_bytes())(*a[1:])"
 Value = int | float | str
 
 
 class CommandSettings(Record):
-    """The command line, with a value for each setting that it contains.
+    """The command line, and a value for each setting in it.
 
-    ``unit``: the unit of length of the frames, by default the unit in a ``candidate.toml`` next to them, otherwise mm. ``version``:
-    the version of the program. ``files``: files and folders that determine the results, in addition to those named in the command.
-    ``moves``: the mesh whose points the program moves. ``time_limit``: the limit on processor time. In Python also
+    ``unit``: the unit of length of the frames, by default the unit in a ``candidate.toml`` next to the frames, otherwise mm.
+    ``version``: the version of the program. ``files``: files and folders that determine the results, in addition to those that the
+    command names. ``moves``: the mesh whose points the program moves. ``time_limit``: the limit on processor time. In Python only,
     ``directory``: the working directory; ``ladder``: for some settings, values from the fastest to the most accurate.
     """
 
@@ -69,7 +69,7 @@ class CommandSettings(Record):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def program(self) -> str:
-        """A hash over the contents of :func:`sources`, as a part of the key of a run."""
+        """A hash over the files in :func:`sources`, which is a part of the key of a run."""
         digest = hashlib.sha256()
         for path in sources(self):
             name = path.relative_to(self.place) if path.is_relative_to(self.place) else path.name
@@ -78,8 +78,9 @@ class CommandSettings(Record):
 
 
 def sources(settings: CommandSettings) -> list[Path]:
-    """The files that determine the results: the program; files that the command names, also after ``=`` and as values of settings;
-    for each Python file among them, all Python files in its folder and below; and ``files``.
+    """The files that determine the results: the program; the files that the command names, including those after a ``=`` or in the
+    value of a setting; for each Python file among them, all Python files in the same folder and its subfolders; and the entries of
+    ``files``. Raises InputError if one of these entries does not exist.
     """
     directory, words = settings.place, _filled(settings, {})
     program = programs.found(words[0], directory)
@@ -97,16 +98,16 @@ def sources(settings: CommandSettings) -> list[Path]:
 
 
 def _filled(settings: CommandSettings, places: Mapping[str, Path]) -> list[str]:
-    """The words of the command with the values of its settings, and with the folders ``places``."""
+    """The words of the command, in which settings are replaced by their values and folders by their paths in ``places``."""
     values = {key: str(value) for key, value in (*settings, *places.items())}
     words = shlex.split(settings.command)
     return [_PLACEHOLDER.sub(lambda found: values.get(found[1], found[0]), word) for word in words]
 
 
 class Description(recorded.About):
-    """The contents of ``candidate.toml`` next to a program. ``law``: the effect that the program uses as its material law, on
-    linear tetrahedra, with a Poisson's ratio of at most the setting ``poisson``; ``takes``: further effects that it models.
-    ``settings``: the values of the settings in the command. ``files``, ``ladder``, ``moves``, ``time_limit``: as for ``command``.
+    """The contents of a ``candidate.toml`` next to a program. ``settings``: the values of the settings in the command. ``files``,
+    ``ladder``, ``moves``, ``time_limit``: as in :class:`CommandSettings`. ``law``: the effect that the program uses as its material
+    law, on linear tetrahedra, with a Poisson's ratio of at most the setting ``poisson``. ``takes``: further effects that it models.
     """
 
     settings: dict[str, Value] = Field(default_factory=dict)
@@ -119,8 +120,8 @@ class Description(recorded.About):
 
 
 def choice(command: str, directory: Path, place: str) -> Candidate:
-    """The ``command``, which runs in a ``directory``, as a candidate; ``place`` names it in messages. Its description is a
-    ``candidate.toml``: next to the first file in the command that has one beside it, else in the directory.
+    """A candidate that runs ``command`` in ``directory``, described by a ``candidate.toml``: the first that is found next to a file
+    in the command, otherwise the one in the directory. ``place``: the name of the command in messages.
     """
     names = placeholders(command, place)
     _check_program(command, directory, place)
@@ -142,8 +143,8 @@ def choice(command: str, directory: Path, place: str) -> Candidate:
 
 
 def of_function(function: Callable[..., None], given: Mapping[str, Any], folder: Path) -> SolverChoice:
-    """The command that calls ``function(scene, out, **settings)`` in another Python process; ``given``: its settings, and keys of
-    :class:`CommandSettings`. The function, with the values, is written into a ``folder``.
+    """A command that calls ``function(scene, out, **settings)`` in another Python process. ``given``: values of the settings, and
+    keys of :class:`CommandSettings`. ``folder``: the folder into which the function and the values of its settings are written.
     """
     own = {key: value for key, value in given.items() if key in CommandSettings.model_fields}
     called = partial(function, **{key: value for key, value in given.items() if key not in own})
@@ -161,7 +162,9 @@ def of_function(function: Callable[..., None], given: Mapping[str, Any], folder:
 
 
 def placeholders(command: str, place: str) -> tuple[str, ...]:
-    """The settings in a ``command``; InputError if it cannot be split, lacks a folder, or has braces without a name."""
+    """The names of the settings in a ``command``. Raises InputError if the command cannot be split into words, lacks a folder, has
+    braces without a name, or has a setting with a reserved name.
+    """
     where = join(place, "command")
     try:
         words = shlex.split(command)
@@ -189,13 +192,13 @@ def _check_named(key: str, names: tuple[str, ...], place: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class CommandSolver(MuscleSolver[CommandSettings]):
-    """The solver, whose settings include those that the command mentions."""
+    """The solver that runs a command. Its settings are those of :class:`CommandSettings` and those that the command contains."""
 
     def record(self, given: Mapping[str, Any], place: str) -> type[CommandSettings]:
-        """The record with a required key for each setting in the command; a setting with a ladder is marked as ``Trade``."""
+        """The type of the settings, with a required key for each setting in the command; a ladder marks a setting as ``Trade``."""
         command, ladder = given.get("command"), given.get("ladder", {})
         if not isinstance(command, str) or not isinstance(ladder, Mapping):
-            return self.settings  # this record then reports the error
+            return self.settings  # the error is reported when the settings are parsed into this record
         names = placeholders(command, place)
         for key in ladder:
             _check_named(key, names, join(place, "ladder"))
@@ -204,16 +207,16 @@ class CommandSolver(MuscleSolver[CommandSettings]):
         return create_model(self.settings.__name__, __base__=self.settings, __doc__=self.settings.__doc__, **fields)
 
     def moved(self, settings: CommandSettings) -> Moves:
-        """The carrier of the unknowns, as the settings state it."""
+        """The carrier of the unknowns, as stated in the settings."""
         return settings.moves
 
     def fills(self, settings: CommandSettings) -> bool:  # noqa: ARG002
-        """True: the scene for the program has tetrahedra and fibres."""
+        """True, because the exported scene always has tetrahedra and fibres."""
         return True
 
 
 def require(settings: CommandSettings) -> None:
-    """Raise InputError if the program, or a file that it needs, is missing."""
+    """Raise InputError if the program or one of its ``files`` is missing."""
     _check_program(settings.command, settings.place, "command")
     sources(settings)
 
@@ -225,7 +228,9 @@ def _check_program(command: str, directory: Path, place: str) -> None:
 
 
 def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outcome:
-    """Run the command and read the frames that it wrote. A failure is a status; frames written before the failure are kept."""
+    """Run the command and read the frames that it wrote. A failure is reported as a status, and earlier frames are kept. Raises
+    InputError if the problem does not start at rest, or if the program does not support the scene.
+    """
     if problem.start is not None:
         raise InputError("command", "a body that does not start at rest", "a body at rest, as an export begins there")
     with scratch_folder() as folder:
@@ -242,7 +247,9 @@ def solve(problem: MuscleProblem, settings: CommandSettings, sink: Sink) -> Outc
 
 
 def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.Ended, out: Path, sink: Sink) -> Outcome:
-    """The outcome of a program that ``ended``, with frames up to a missing or damaged one; InputError if it refused the scene."""
+    """The outcome of a program that ``ended``. Its frames, up to the first missing or damaged frame, go to ``sink``. Raises
+    InputError if the program does not support the scene.
+    """
     if ended.code == REFUSED:
         raise InputError("command", ended.said or f"exit status {REFUSED}", "a scene that the program supports")
     free = len(problem.surface.points) - len(np.unique(problem.attached_vertices))
@@ -276,7 +283,9 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
 
 
 def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended) -> dict[str, float]:
-    """The threads and the time for solving frames alone that the program states; InputError if this exceeds its running time."""
+    """The entries of the cost that the program states: its threads, and the time in which it solved the frames. Raises InputError
+    if this time is longer than the program ran.
+    """
     found = {} if said.threads is None else {"threads": float(said.threads)}
     if said.seconds_per_frame is None:
         return found

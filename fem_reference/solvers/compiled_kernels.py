@@ -1,4 +1,4 @@
-"""Compilation of loops, and the cache of their machine code."""
+"""Compilation of numerical loops by numba, and the cache for their machine code."""
 
 import hashlib
 import tempfile
@@ -11,7 +11,10 @@ import platformdirs
 
 
 class _Compiled:
-    """A function that numba compiles when it, or a compiled function that calls it, is first called; numba is imported then."""
+    """A function that numba compiles at its first call, or at the first call of a compiled function that uses it.
+
+    Only then is numba imported.
+    """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         update_wrapper(self, function)
@@ -26,13 +29,13 @@ class _Compiled:
 
     @cached_property
     def machine_code(self) -> Any:
-        """The function that numba has compiled."""
+        """The compiled function."""
         import numba
 
         if not can_keep(kept_code()):
             return numba.njit(error_model="numpy")(self.function)
         before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(kept_code())  # numba reads the setting here, and not again for this function
+        numba.config.CACHE_DIR = str(kept_code())  # numba reads this setting once, while it creates the function
         try:
             return numba.njit(cache=True, error_model="numpy")(self.function)
         finally:
@@ -40,13 +43,16 @@ class _Compiled:
 
 
 def compiled[F: Callable[..., Any]](function: F) -> F:
-    """``function`` as machine code for one thread: compiled at the first call, and stored on disk if the disk is writable."""
+    """``function`` as machine code for one thread, compiled at the first call and stored on disk if the disk is writable."""
     return cast(F, _Compiled(function))
 
 
 @cache
 def can_keep(folder: Path) -> bool:
-    """True if files can be written in ``folder``, which is created; False for a relative path (a user without a home folder)."""
+    """True if files can be written in ``folder``, which is created if necessary.
+
+    False for a relative path, which occurs if the user has no home folder.
+    """
     if not folder.is_absolute():
         return False
     try:
@@ -59,10 +65,10 @@ def can_keep(folder: Path) -> bool:
 
 @cache
 def kept_code() -> Path:
-    """The folder in which the machine code of these loops is stored; it may be deleted.
+    """The folder in which machine code is stored. It may be deleted at any time.
 
-    A compiled function contains the functions that it calls, but numba checks only the function's own file for changes. So the
-    folder's name is a hash of all files of kernels.
+    A compiled function contains the functions that it calls, but numba checks only the file of the function itself for changes.
+    Therefore the name of the folder is a hash of all files with kernels.
     """
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*_kernels.py")):

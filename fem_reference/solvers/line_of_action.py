@@ -1,8 +1,8 @@
-"""Lines of action: each fibre of the scene as one line between its bones, straight, through via-points or around an obstacle.
+"""Lines of action: each fibre of the scene is a line between bones, straight, through via-points or around obstacles.
 
-Report sections 5.1 to 5.3. The ends of a line are the ends of the fibre, each fixed to the bone with the nearest attachment at
-rest. Between fixed points a line is as short as possible. It has a length, with ``hill`` also a force, and no surface: only length
-and force are judged. A line takes the shorter side of an obstacle, and so changes sides when its ends pass opposite points.
+Report sections 5.1 to 5.3. The ends of a line are those of the fibre, each fixed to the bone whose attachment is nearest at rest.
+Between fixed points the line is as short as possible. It has a length and, with ``hill``, a force, but no surface, so only length
+and force are judged. At an obstacle the line takes the shorter side, so it switches sides when both sides are equally long.
 """
 
 from itertools import pairwise
@@ -29,11 +29,11 @@ from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
 
 
 class LineSettings(Record):
-    """Points through which lines pass, and obstacles around which they wrap; without any key, lines are straight.
+    """Points through which lines pass, obstacles around which they wrap, and their forces. By default lines are straight.
 
-    ``via``: points in the order in which a fibre passes them. ``via_count``: instead of ``via``, a number of points spread evenly
-    over each fibre, each on the bone of the nearer end. ``obstacle``: surfaces around which a segment between two fixed points
-    wraps if the straight path would cross them. ``hill``: forces of the lines.
+    ``via``: the via-points, in order along the fibre. ``via_count``: instead of ``via``, the number of via-points that are spread
+    evenly over each fibre, each on the bone of the nearer end. ``obstacle``: surfaces around which a line wraps if the straight
+    path between two fixed points would cross them. ``hill``: the muscle model that determines the forces of the lines.
     """
 
     via: tuple[Via, ...] = ()
@@ -49,7 +49,7 @@ class LineSettings(Record):
 
 
 class Shortest:
-    """The ``lines`` of a muscle, at any frame as short as the ``wraps`` allow."""
+    """The ``lines`` of a muscle, which are at each frame as short as the obstacles in ``wraps`` allow."""
 
     advice = "a smaller radius may help"
 
@@ -63,7 +63,7 @@ class Shortest:
         self.muscles = () if self.hill is None else self.hill.muscles(self.lengths(problem.frames[0]))
 
     def lengths(self, number: int) -> Floats:
-        """The lengths (k,) [mm] of the lines at a frame."""
+        """The lengths (k,) [mm] of the lines at frame ``number``."""
         return _lengths(self.lines.at(number), self.wraps.around(self.lines.at(number).points, number))
 
     def move(self, number: int) -> None:
@@ -76,17 +76,19 @@ class Shortest:
         if wrong:
             self.wrong = Trouble("diverged", wrong)
         else:
-            points = paths.at(passed.part, passed.share)  # as many points as the fibres have
-            lost = float((_lengths(passed, paths) - self.problem.fibres.lengths(points)).max())  # as chords are shorter
+            points = paths.at(passed.part, passed.share)  # the number of points of each fibre stays the same
+            lost = float((_lengths(passed, paths) - self.problem.fibres.lengths(points)).max())  # chords are shorter
             try:
                 scalars = {"lost_by_chords_max": lost} | self._forces(passed, paths)
-            except InputError as error:  # the line is too short or too long for the model of the muscle
+            except InputError as error:  # a line is too short or too long for the muscle model
                 self.wrong = Trouble("diverged", str(error))
                 return
             self.found = Frame(number, None, fibres=points, scalars=scalars)
 
     def _forces(self, passed: Passed, paths: Paths | Winding) -> dict[str, float]:
-        """The force [N] of all lines, the mean fibre length divided by the optimal length, and the forces on bones."""
+        """Scalars of a frame: the total force [N] of the lines, the mean fibre length divided by the optimal length, and the forces
+        and moments on bones; empty without ``hill``.
+        """
         if self.hill is None:
             return {}
         pairs = zip(self.muscles, _lengths(passed, paths).tolist(), strict=True)
@@ -95,32 +97,35 @@ class Shortest:
         return sums | _on_bones(self.problem.bones, self.wraps, passed, paths, found[:, 0])
 
     def trouble(self) -> Trouble | None:
-        """The trouble with a fixed point inside an obstacle, a path that was not found, or a line's force; None if none."""
+        """The trouble: a fixed point is inside an obstacle, no path was found, or a line has no force; None if there is none."""
         return self.wrong
 
     def frame(self, _: int) -> Frame:
-        """The lines at the frame to which they moved last."""
+        """The lines at the last frame for which ``move`` found them."""
         return self.found
 
     def ending(self) -> Outcome:
-        """Converged; the message states via-points and obstacles."""
+        """The outcome, always *converged*; its message states the number of via-points and the obstacles."""
         kind = f"straight, through {self.vias} via-points" if self.vias else "straight"
         around = f" or around {self.wraps}" if self.wraps.given else ""
         return Outcome("converged", f"{len(self.lines.fixed)} lines, {kind}{around}; no surface")
 
 
 def solve(problem: MuscleProblem, settings: LineSettings, sink: Sink) -> Outcome:
-    """Compute the lines at the requested frames, up to the first trouble; InputError if a fixed point starts in an obstacle."""
+    """Compute the lines at the requested frames, up to the first trouble.
+
+    Raises InputError if a fixed point is inside an obstacle at the first frame.
+    """
     return each(Shortest(problem, settings), problem.frames, problem.frames, sink)
 
 
 def check(settings: LineSettings, problem: MuscleProblem, place: str) -> None:
-    """Raise InputError below ``place`` if lines cannot have the points and obstacles of the settings."""
+    """Raise InputError, with a key inside ``place``, if lines with these via-points and obstacles are impossible."""
     _made(problem, settings, place)
 
 
 def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[Lines, Wraps]:
-    """The lines and the obstacles; InputError below ``place`` if they are impossible at the first frame."""
+    """The lines and the obstacles. Raises InputError, with a key inside ``place``, if they are impossible at the first frame."""
     lines, first = lines_of(problem, settings.via, settings.via_count, place), problem.frames[0]
     wraps = wraps_of(problem, settings.obstacle, place)
     name, inside = wraps.inside(lines.at(first).points, first)
@@ -130,16 +135,17 @@ def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[L
 
 
 def _lengths(passed: Passed, paths: Paths | Winding) -> Floats:
-    """The lengths (k,) [mm] of lines from the lengths of their parts."""
+    """The lengths (k,) [mm] of lines: sums over the lengths of their parts."""
     return np.asarray(paths.lengths.reshape(len(passed.points), -1).sum(axis=1))
 
 
 def _on_bones(
     bones: tuple[Bone, ...], wraps: Wraps, passed: Passed, paths: Paths | Winding, tensions: Floats
 ) -> dict[str, float]:
-    """The force [N] and, about the origin, the moment [N mm] on each bone by lines of these ``tensions`` (k,) [N].
+    """The components of the force [N] and of the moment about the origin [N mm] on each bone, by the names of scalars.
 
-    A part pulls at both of its ends, along its direction; an obstacle bears the pulls of both sides, as the line has no weight.
+    ``tensions`` (k,) [N]: the forces of the lines. Each part of a line pulls at both of its ends, along the path. An obstacle
+    receives the pull of the line on both sides of the contact, because a line without weight is in equilibrium there.
     """
     fixed, on_bone = passed.points, passed.on
     pulls = np.repeat(tensions, fixed.shape[1] - 1)[:, None]

@@ -1,8 +1,9 @@
-"""The report's Octave listings (4.1 on an interval, 4.5 on triangles): their results, even where they contradict the report's text.
+"""The report's Octave listings 4.1 (an interval) and 4.5 (triangles), with their results even where these contradict the text.
 
-Listings 4.1, 4.2, 4.4 and 4.5 are transcribed. Vertices are numbered from 0 here and from 1 in the listings. ``bounds`` (2, m) is
-the listings' list of Dirichlet conditions: a row of vertices and a row of values. Listing 4.5 uses only the directions of edges, so
-lengths may have any unit. validation/octave has the listings as run, their results, and the reading of each misprint.
+Listings 4.1, 4.2, 4.4 and 4.5 are transcribed. Vertices are numbered from 0 here and from 1 in the listings. The argument
+``bounds`` (2, m) is the list of Dirichlet conditions in the listings: a row of vertices and a row of values. Listing 4.5 uses only
+the directions of edges, so lengths may have any unit. validation/octave contains the listings as they were run, their
+results, and the interpretation of each misprint.
 """
 
 import time
@@ -20,20 +21,24 @@ from fem_reference.problems.scalar import FieldProblem, at
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.protocol import FieldSolver
 
-# The factors of A A, A and the unit matrix in line 18 of listing 4.5.
+# The factors of A A, A and the identity matrix in line 18 of listing 4.5.
 SQUARE, LINEAR, CONSTANT = 26.0, 2.0, 0.05
 
 
 class ListingSettings(Record):
-    """``peclet``: the Peclet number, the argument of listing 4.1, by default 1 as in its header; listing 4.5 has no argument."""
+    """Settings of the listings.
+
+    ``peclet``: the Peclet number, which is the argument of listing 4.1, by default 1 as in its header. Listing 4.5 has no argument.
+    """
 
     peclet: float | None = Field(default=None, gt=0)
 
 
 def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outcome:
-    """Run the listing for the problem's domain, with the problem's mesh and fixed values; equation and slopes are the listing's.
+    """Run the listing for the domain of the problem: 4.1 for an interval, 4.5 for triangles.
 
-    Listing 4.5 plots the negative norm of its vector unknown. This plotted value is the field; ``components`` has the vector.
+    The mesh is that of the problem, and so are the fixed values of listing 4.5; the listing defines the equation and the slopes.
+    Listing 4.5 plots the negative norm of its vector unknown. This plotted value is the field, and ``components`` is the vector.
     """
     begin = time.perf_counter()
     mesh = problem.mesh
@@ -54,8 +59,9 @@ def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outco
 
 
 def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
-    """Raise InputError at ``place`` if the listing for the problem's domain lacks something that the case or the settings request.
-    Listing 4.1 has the conditions 0 at the first node and slope -1 at the last; listing 4.5 has values only.
+    """Raise InputError, with a key inside ``place``, if the listing does not have the boundary conditions or settings requested.
+
+    Listing 4.1 has the value 0 at the first node and the slope -1 at the last. Listing 4.5 has only values, and no Peclet number.
     """
     points, fixed = problem.mesh.points, problem.fixed[: len(problem.mesh.points)]
     if problem.mesh.cells.shape[1] == 2:
@@ -70,15 +76,16 @@ def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
 
 
 def fem1d(nodes: Floats, peclet: float) -> Floats:
-    """Listing 4.1 at given increasing ``nodes`` (n,): the solution (n,), 0 at the first node and of slope -1 / peclet at the last.
+    """The solution (n,) of listing 4.1 at increasing ``nodes`` (n,): 0 at the first node, with the slope -1 / peclet at the last.
 
-    ``diff_op = -peclet K`` with K the stiffness matrix of linear elements, and the source 1 is divided by ``peclet``, so the
-    listing solves ``peclet psi'' = 1 / peclet``, ``peclet psi'(1) = -1``. On (0, 1) the values are exact at any nodes:
-    ``psi = x^2 / (2 peclet^2) - x (1 / peclet + 1 / peclet^2)``, which is eq. 4.10 for a ``peclet`` of 1. There is no advection.
+    ``diff_op`` is ``-peclet K``, where K is the stiffness matrix of linear elements, and the source 1 is divided by ``peclet``.
+    Therefore the listing solves ``peclet psi'' = 1 / peclet`` with ``peclet psi'(1) = -1``, without advection. On (0, 1) the values
+    are exact at any nodes: ``psi = x^2 / (2 peclet^2) - x (1 / peclet + 1 / peclet^2)``, which is eq. 4.10 if ``peclet`` is 1.
+    Raises InputError if the nodes do not increase or ``peclet`` is not positive.
     """
     steps = np.diff(nodes)
     if len(steps) == 0 or not (steps > 0).all():
-        raise InputError("nodes", "nodes that do not increase", "two or more, each beyond the one before")
+        raise InputError("nodes", "nodes that do not increase", "two or more, in increasing order")
     if not peclet > 0:
         raise InputError("peclet", peclet, "more than zero")
     idel = peclet / steps
@@ -91,11 +98,12 @@ def fem1d(nodes: Floats, peclet: float) -> Floats:
 
 
 def first_derivative(triangles: Ints, points: Floats) -> Any:
-    """Listing 4.2: sparse A (n dim, n dim) over ``triangles`` (m, 3) of ``points`` (n, dim): one block for each pair of points.
+    """The sparse matrix A (n dim, n dim) of listing 4.2, for ``triangles`` (m, 3) of ``points`` (n, dim).
 
-    For every edge of every triangle, with d its direction: ``d d^T`` is added to the blocks of both its ends and subtracted from
-    the two blocks between them. A is not a differential operator: ``u^T A u = sum over edges of w (d . (u_s - u_t))^2`` is twice
-    the energy of springs along the edges, whose stiffness w does not depend on their length: w = 2 inside and 1 at the rim.
+    A has a block (dim, dim) for each pair of points. For each edge of each triangle, with the unit vector d along the edge,
+    ``d d^T`` is added to the diagonal blocks of both ends and subtracted from the two blocks that couple the ends. A is not a
+    differential operator: ``u^T A u = sum over edges of w (d . (u_s - u_t))^2`` is twice the energy of springs along the edges.
+    Their stiffness w does not depend on the length: it is 2 for an interior edge and 1 for a boundary edge.
     """
     dim = points.shape[1]
     s, t = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
@@ -116,10 +124,11 @@ def first_derivative(triangles: Ints, points: Floats) -> Any:
 
 
 def dirichlet(A: Any, b: Floats, dim: int, bounds: Floats) -> tuple[Any, Floats]:
-    """Listing 4.4: A (n dim, n dim) and b (n dim,) with every component of the vertices of ``bounds`` (2, m) set to their value.
+    """Apply Dirichlet conditions as in listing 4.4. Returns A (n dim, n dim) and b (n dim,).
 
-    Their columns are moved to the right side, and their rows and columns become those of the unit matrix. A vertex that is named
-    twice is an error: the listing would use its first value for the neighbours and its last value for the vertex itself.
+    Each component of each vertex in ``bounds`` (2, m) is set to the value of the vertex. The columns of these unknowns are moved to
+    the right-hand side, and their rows and columns are replaced by those of the identity matrix. Raises InputError if a vertex
+    is listed twice: the listing would use its first value for its neighbours and its last value for the vertex itself.
     """
     vertices = bounds[0].astype(np.int64)
     if len(np.unique(vertices)) < len(vertices):
@@ -134,20 +143,20 @@ def dirichlet(A: Any, b: Floats, dim: int, bounds: Floats) -> tuple[Any, Floats]
 
 
 def right_side(points: Floats) -> Floats:
-    """Listing 4.5, line 17: (n dim,), 1 for every component of the ``points`` (n, dim) whose y is above average, else 0.
+    """The right-hand side (n dim,) in line 17 of listing 4.5: 1 for all components of ``points`` (n, dim) above the mean y, else 0.
 
-    The mean is summed from the first point to the last, as Octave does, so that a point at the average falls on the same side.
+    The sum for the mean goes from the first point to the last, as in Octave, so that a point at the mean is on the same side.
     """
     y = points[:, 1]
     return np.repeat((y > np.cumsum(y)[-1] / len(y)).astype(np.float64), points.shape[1])
 
 
 def fem2d(triangles: Ints, points: Floats, bounds: Floats) -> tuple[Floats, Floats]:
-    """Listing 4.5 over ``triangles`` (m, 3) of ``points`` (n, 2 or 3): its x (n,), and the vector unknown (n, dim) whose norm
-    is x (the listing draws -x): ``(26 A A + 2 A + 0.05) u = b``.
+    """The results x (n,) and u (n, dim) of listing 4.5 on ``triangles`` (m, 3) of ``points`` (n, 2 or 3).
 
-    A, from listing 4.2, is positive semidefinite and so has the sign of minus a second derivative. The three terms therefore
-    correspond to derivatives of order 4, 2 and 0, those of the text's ``26 psi'' + 2 psi' + 0.05 psi = f`` to order 2, 1 and 0.
+    The listing solves ``(26 A A + 2 A + 0.05) u = b``; x is the norm of u at each point, and the listing plots -x. A, from listing
+    4.2, is positive semidefinite and so has the sign of a negative second derivative. Therefore the three terms correspond to
+    derivatives of order 4, 2 and 0, whereas the text's ``26 psi'' + 2 psi' + 0.05 psi = f`` has the orders 2, 1 and 0.
     """
     dim = points.shape[1]
     A = first_derivative(triangles, points)

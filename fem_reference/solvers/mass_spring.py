@@ -1,9 +1,9 @@
-"""A mass-spring system: report section 5.5.1, eqs 5.3 to 5.7.
+"""A mass-spring system. Report section 5.5.1, eqs 5.3 to 5.7.
 
-A volumetric model, as in Table 5.1: the masses are the points of the tetrahedra, and the springs are their edges. (Janak's masses
-are samples of fibres, joined to nearby masses.) The displacement of surface and fibres is interpolated from the masses. Springs
-resist neither a change of volume nor the inversion of a tetrahedron. Attachments are exact; their stiffness is ignored.
-Contact acts on the masses of the surface only: the surface between them may be inside a bone.
+This is a volumetric model, as in Table 5.1: the points of the tetrahedral mesh are masses, and its edges are springs. (In Janak's
+model the masses are points sampled on fibres and connected to nearby masses.) The displacement of the surface and of the fibres is
+interpolated from the masses. Springs resist neither a change of volume nor the inversion of a tetrahedron. Attachments are exact;
+their stiffness is ignored. Contact acts only on masses at the surface, so the surface between them may penetrate a bone.
 """
 
 import math
@@ -27,17 +27,17 @@ from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble
 from fem_reference.solvers.pbd import PbdCollision
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
 
-# The ratio of the default time step to the largest stable time step.
+# The default time step divided by the largest stable time step.
 SHARE_OF_STABLE = 0.9
-# A run with more steps per frame number than this is refused: with 3,000 tetrahedra each frame number would take over two seconds.
+# The maximum number of time steps per frame number; these take more than two seconds with 3,000 tetrahedra.
 _MOST_STEPS = 100_000
-# Time steps in one call of compiled code; the user can interrupt a run only between calls.
+# The number of time steps in one call of compiled code. A user can interrupt a run only between two calls.
 _AT_ONCE = 200
 _REPORT = "eq. 5.5"
 
 
 def _damping(text: object) -> float | str:
-    """A damping coefficient [N s/mm], or ``"eq. 5.5"``."""
+    """The damping coefficient [N s/mm] in a ``text``, or ``"eq. 5.5"``."""
     if text == _REPORT:
         return _REPORT
     try:
@@ -49,11 +49,12 @@ def _damping(text: object) -> float | str:
 class MassSpringSettings(Record):
     """Stiffness, density, loads and time steps of the mass-spring system.
 
-    ``stiffness``: of every spring. ``density``: of the muscle. All masses are equal, as equilibrium does not depend on masses and a
-    single small mass would make every time step small. ``frame_time``: the solver's time between successive frame numbers, in place
-    of the scene's interval; the longer it is, the nearer the muscle is to equilibrium. ``damping``: the coefficient c, or
-    ``"eq. 5.5"`` (``report_damping``); by default none. ``gravity``: an acceleration, by default none. ``collision``: contact with
-    bones at every step, by default none. ``time_step``: the maximum, by default 0.9 of the stable time step.
+    ``stiffness``: the stiffness of each spring. ``density``: the density of the muscle, whose mass is divided equally among the
+    masses: equilibrium without gravity does not depend on them, and a single small mass would make every time step small.
+    ``frame_time``: the time between two frame numbers in this solver, which replaces the interval of the scene; the longer it is,
+    the closer the muscle comes to equilibrium. ``damping``: the coefficient c, or ``"eq. 5.5"`` for the value of
+    ``report_damping``; by default there is no damping. ``gravity``: an acceleration, by default none. ``collision``: contact with
+    bones after every time step, by default none. ``time_step``: the maximum time step, by default 0.9 of the stable time step.
     """
 
     stiffness: Stiffness
@@ -66,7 +67,7 @@ class MassSpringSettings(Record):
 
 
 def network_of(mesh: TetMesh, settings: MassSpringSettings) -> Network:
-    """The masses and springs of a mesh."""
+    """The masses and springs of a tetrahedral mesh."""
     pairs = np.concatenate([mesh.tets[:, list(pair)] for pair in combinations(range(4), 2)])
     springs = np.unique(np.sort(pairs, axis=1), axis=0)
     mass = settings.density * float(tet_volumes(mesh.points, mesh.tets).sum()) / len(mesh.points)
@@ -82,23 +83,24 @@ def network_of(mesh: TetMesh, settings: MassSpringSettings) -> Network:
 
 
 def report_damping(mass: float, stiffness: float) -> float:
-    """Eq. 5.5, c = 2 sqrt(2 m (2 + 4 / k_a)), as a coefficient [N s/mm] of a ``mass`` [tonne] and a ``stiffness`` [N/mm].
+    """The damping coefficient c = 2 sqrt(2 m (2 + 4 / k_a)) [N s/mm] of eq. 5.5, for a ``mass`` m [tonne] and a ``stiffness`` k_a
+    [N/mm].
 
-    The equation adds a number to one over a stiffness, so it is valid in one system of units only, which the report does not name.
-    In SI (kg, N/m, N s/m), as here, it gives the critical damping 2 sqrt(m k) of a mass on a spring of k = 4 + 8 / k_a. This is k_a
-    if k_a is 2 + sqrt(12) = 5.46 N/m, and 4 N/m if k_a is large.
+    The equation adds a constant to the reciprocal of a stiffness, so it holds in a single system of units, which the report does
+    not state. In SI units (kg, N/m, N s/m), which are used here, c is the critical damping 2 sqrt(m k) of a mass on a spring of
+    stiffness k = 4 + 8 / k_a. This k equals k_a for k_a = 2 + sqrt(12) = 5.46 N/m, and approaches 4 N/m for large k_a.
     """
     kilograms, newtons_per_metre = 1000 * mass, 1000 * stiffness
     return 2 * math.sqrt(2 * kilograms * (2 + 4 / newtons_per_metre)) / 1000
 
 
 def stable_time_step(network: Network, fixed: Ints) -> float:
-    """The time step [s] below which eqs 5.6 and 5.7 are stable, for any shape.
+    """The time step [s] below which eqs 5.6 and 5.7 are stable, however the network is deformed. ``fixed``: the prescribed masses.
 
-    A mode of the free masses is stable if ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions), with k its stiffness. At mass i with
-    n_i springs, stretched or not, k is at most ``2 n_i`` times the stiffness of a spring; the smallest limit of all masses counts.
-    The positive root is ``4 m / (c + sqrt(c^2 + 4 k m))``, a form without cancellation. For c = 0 it is 2 / omega with
-    omega^2 = k / m, the exact limit of two masses on one spring.
+    A mode of the free masses with stiffness k is stable if ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions). At a mass with
+    n_i springs, stretched or not, k is at most ``2 n_i`` times the stiffness of a spring. The result is the smallest limit over all
+    free masses. Each limit is the positive root ``4 m / (c + sqrt(c^2 + 4 k m))``, written in a form without cancellation. For
+    c = 0 the root is 2 / omega with omega^2 = k / m, which is the exact limit for two masses on one spring.
     """
     springs = network.stiffness * np.bincount(network.springs.ravel(), minlength=len(network.masses))
     c = network.damping
@@ -107,8 +109,11 @@ def stable_time_step(network: Network, fixed: Ints) -> float:
 
 
 class MassSpringModel:
-    """A muscle as masses and springs, advanced from each frame number to the next: its ``network``, the ``fixed`` masses (k,), and
-    the bones with which the other masses collide. Masses are at ``points`` (n, 3) [mm]; one step earlier they were at ``previous``.
+    """A muscle of masses and springs, advanced from each frame number to the next.
+
+    ``network``: the masses and springs. ``fixed`` (k,): the attached masses. ``bones``: the bones with which free masses at the
+    surface collide. ``points`` (n, 3) [mm]: the present positions of the masses. ``previous`` (n, 3) [mm]: their positions one time
+    step earlier.
     """
 
     def __init__(self, problem: MuscleProblem, settings: MassSpringSettings) -> None:
@@ -136,7 +141,7 @@ class MassSpringModel:
         self.cost: dict[str, float] = {"unknowns": 3.0 * free, "time_steps": 0}
 
     def move(self, number: int) -> None:
-        """Take the time steps from the previous frame number to ``number``."""
+        """Take the time steps from the previous frame number to frame ``number``."""
         before, after = (self.carried(frame)[self.fixed] for frame in (number - 1, number))
         at_once = 1 if self.bones else _AT_ONCE
         for done in range(0, self.steps, at_once):
@@ -151,7 +156,7 @@ class MassSpringModel:
         self.cost["time_steps"] += self.steps
 
     def carried(self, number: int) -> Floats:
-        """The positions (n, 3) [mm] of free masses at rest and of attached masses at frame ``number``."""
+        """Positions (n, 3) [mm]: attached masses have moved with their bones to frame ``number``, and free masses are at rest."""
         points = np.array(self.problem.mesh.points)
         for entry, masses in zip(self.problem.attached, self.attached, strict=True):
             points[masses] = apply(entry.bone.pose(number), points[masses])
@@ -162,7 +167,7 @@ class MassSpringModel:
         return self.check.trouble(self.points)
 
     def frame(self, number: int) -> Frame:
-        """Surface and fibres, interpolated from the masses; attached vertices move with their bones.
+        """The surface and the fibres, interpolated from the masses. Attached vertices move exactly with their bones.
 
         Scalars: ``unbalanced_max`` [N], the maximum force on a free mass, and ``inverted_tets``, the number of inverted tetrahedra.
         """
@@ -177,11 +182,13 @@ class MassSpringModel:
         return Frame(number, surface, fibres, self.points.copy(), scalars)
 
     def _inverted(self) -> int:
-        """The number of tetrahedra that are inside out."""
+        """The number of inverted tetrahedra."""
         return int((tet_volumes(self.points, self.problem.mesh.tets) <= 0).sum())
 
     def ending(self) -> Outcome:
-        """Converged; the message counts inverted tetrahedra and notes a ``frame_time`` that differs from the scene's interval."""
+        """The outcome, always *converged*. Its message states the number of inverted tetrahedra at the last frame and, if
+        ``frame_time`` differs from the interval of the scene, both times.
+        """
         frames, count, tets = self.problem.frames, self._inverted(), len(self.problem.mesh.tets)
         done = f"{frames[-1] - frames[0]} frame numbers, each of {self.steps} steps of {self.time_step:.3g} s"
         note = f"; {count} of {tets} tetrahedra are inside out at the last frame" if count else ""
@@ -189,7 +196,10 @@ class MassSpringModel:
 
 
 def solve(problem: MuscleProblem, settings: MassSpringSettings, sink: Sink) -> Outcome:
-    """Step from rest at the first of ``problem.frames`` to the last of them; each requested frame goes into ``sink``."""
+    """Advance from rest at the first of ``problem.frames`` to the last; each requested frame goes to ``sink``.
+
+    The status is *out of steps* if a frame number needs too many time steps.
+    """
     quick = settings.model_copy(update={"time_step": settings.frame_time})
     model = timed(MassSpringModel, problem, settings, quick)
     if model.wanted <= _MOST_STEPS:

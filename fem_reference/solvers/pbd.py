@@ -1,9 +1,10 @@
-"""Position based dynamics of the muscle surface: the report's Algorithm 1 (section 5.5.3).
+"""Position based dynamics of the muscle surface, by Algorithm 1 of the report (section 5.5.3).
 
-Frame number n is the state after iteration n. In an iteration the bones first take their pose; then every sub-iteration is a full
-step of the algorithm. No external force acts, so the time step cancels and is no setting: instead of velocities, ``dt v``, the
-displacements of vertices in one sub-iteration, are stored. As in the report, the result depends on the order of the vertices, since
-constraints are projected one after the other. Collisions are found anew in every sweep; the algorithm finds them once, in line 13.
+Frame number n is the state after iteration n. In an iteration the bones first move to their pose; then each sub-iteration is a
+complete step of the algorithm. There are no external forces, so the time step cancels and is not a setting. Instead of velocities
+v, the displacements ``dt v`` of vertices in one sub-iteration are stored. As in the report, the result depends on the order of the
+vertices, because constraints are projected one after the other. Collisions are detected again in each sweep, whereas the report's
+algorithm detects them once per step, in line 13.
 """
 
 from collections.abc import Sequence
@@ -24,13 +25,15 @@ from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 
 Stiffness = Annotated[float, Field(ge=0, le=1)]
-# Segments count as equally near if their distances differ by less than this fraction of the size of the muscle.
+# Segments count as equally near if their distances differ by at most this fraction of the size of the muscle.
 _AS_NEAR = 1e-9
 
 
 class PbdCollision(Record):
-    """Contact of bones with free vertices. ``gap`` [mm]: the smallest allowed distance of a vertex, unless its distance at rest is
-    less; ``stiffness``: the fraction of the displacement out of a bone that one projection applies.
+    """Contact of bones with free vertices.
+
+    ``gap`` [mm]: the minimum distance between a vertex and a bone; for a vertex that is closer at rest, the minimum is its distance
+    at rest. ``stiffness``: the fraction of the displacement out of a bone that one projection applies.
     """
 
     gap: Annotated[Length, Field(ge=0)]
@@ -38,15 +41,15 @@ class PbdCollision(Record):
 
 
 class PbdSettings(Record):
-    """Settings of the algorithm; every key is required except the keys that add an effect.
+    """Settings of the algorithm; every key is required except ``anisotropy`` and ``collision``.
 
-    ``sub_iterations``: steps of the algorithm in each iteration, 3 in section 6.1 of the report. ``solver_iterations``: sweeps over
-    all constraints in each step (line 15). ``damping``: the fraction of each velocity lost in a step (line 8). ``stretch``,
-    ``volume``, ``bending``: the stiffness of edge lengths, enclosed volume and dihedral angles, that is, the fraction of an
-    error that one projection removes, from 0 (constraint off) to 1.
+    ``sub_iterations``: the number of steps of the algorithm in each iteration, 3 in section 6.1 of the report.
+    ``solver_iterations``: the number of sweeps over all constraints in each step (line 15). ``damping``: the fraction of each
+    velocity that is lost in a step (line 8). ``stretch``, ``volume``, ``bending``: the stiffness of edge lengths, of the volume and
+    of dihedral angles, that is, the fraction of an error that one projection removes, from 0 (constraint off) to 1.
 
-    ``anisotropy`` a: an edge has the stiffness ``stretch (1 - a |cos|)``, with the cosine of its angle to the nearest fibre at
-    rest; a = 1 in the report's program with fibres. ``collision``: contact with bones (lines 12 to 14).
+    ``anisotropy``: the factor a in the stiffness ``stretch (1 - a |cos|)`` of an edge, with the cosine of its angle to the nearest
+    fibre at rest; a = 1 in the report's program with fibres. ``collision``: contact with bones (lines 12 to 14).
     """
 
     sub_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10))]
@@ -61,11 +64,11 @@ class PbdSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class PbdConstraints:
-    """The constraints that keep a surface at its rest state.
+    """The constraints that pull a surface towards its rest state.
 
-    ``lengths`` (e,) [mm] of ``edges`` (e, 2), and ``share`` (e,), a factor on the stiffness of each; ``six_volumes`` [mm3],
-    six times the volume inside ``triangles`` (m, 3); ``angles`` (e,) [rad] of ``hinges`` (e, 4), the two triangles at each
-    edge. ``inverse_masses`` (n,): 0 for an attached vertex, 1 for every other.
+    ``edges`` (e, 2) with their ``lengths`` at rest (e,) [mm] and ``share`` (e,), a factor on the stiffness of each edge.
+    ``triangles`` (m, 3) with ``six_volumes`` [mm3], six times the volume inside at rest. ``hinges`` (e, 4), the pairs of triangles
+    at each edge, with their dihedral ``angles`` at rest (e,) [rad]. ``inverse_masses`` (n,): 0 for attached vertices, otherwise 1.
     """
 
     inverse_masses: Floats
@@ -84,7 +87,7 @@ class PbdConstraints:
 
     @classmethod
     def at_rest(cls, points: Floats, triangles: Ints, attached: Ints) -> "PbdConstraints":
-        """The constraints of a closed surface with ``attached`` vertices (k,); all edges are equally stiff."""
+        """The constraints of a closed surface with ``attached`` vertices (k,), in which all edges have the same stiffness."""
         points, triangles = np.array(points), np.array(triangles)  # compiled functions need writable arrays
         inverse_masses = np.ones(len(points))
         inverse_masses[attached] = 0
@@ -103,7 +106,7 @@ class PbdConstraints:
 
 
 def hinges_of(triangles: Ints) -> Ints:
-    """The hinges (e, 4), one for each edge of a closed surface, sorted by vertices: both ends, and the two vertices opposite."""
+    """The hinges (e, 4) of a closed surface: both ends of each edge, then the two vertices opposite; sorted by the ends."""
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     opposite = triangles[:, [2, 0, 1]].ravel()
     order = np.lexsort((edges[:, 1], edges[:, 0]))
@@ -111,8 +114,9 @@ def hinges_of(triangles: Ints) -> Ints:
 
 
 def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
-    """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre segment nearest to the middle of the edge. Of
-    segments that are equally near up to rounding, as at a kink, the first counts; so a rotated scene gives the same choice.
+    """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre segment nearest to the midpoint of the edge.
+
+    If several segments are equally near up to rounding, as at a kink, the first is used, also in a rotated scene.
     """
     starts = np.setdiff1d(np.arange(len(fibres.points) - 1), fibres.offsets[1:] - 1)
     starts = starts[np.any(fibres.points[starts + 1] != fibres.points[starts], axis=1)]
@@ -125,12 +129,12 @@ def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
 
 
 def solve(setup: Setup, settings: PbdSettings, sink: Sink) -> Outcome:
-    """Iterate from rest at the first of ``setup.frames`` to the last of them; each requested frame goes into ``sink``."""
+    """Iterate from rest at the first of ``setup.frames`` to the last; each requested frame goes to ``sink``."""
     return follow(timed(PbdSurface, setup, settings), setup, sink)
 
 
 class PbdSurface(MovingSurface):
-    """A surface with its constraints, the last ``displacement`` (n, 3) [mm] of its vertices, and bones with which it collides."""
+    """A surface with its constraints, the last ``displacement`` (n, 3) [mm] of its vertices, and ``bones`` that it may touch."""
 
     def __init__(self, setup: Setup, settings: PbdSettings) -> None:
         super().__init__(setup)
@@ -142,7 +146,7 @@ class PbdSurface(MovingSurface):
         self.cost["projections"] = 0.0
 
     def move(self, number: int) -> None:
-        """Run one iteration."""
+        """Run one iteration, up to frame ``number``."""
         carry(self.points, self.setup, number)
         for bone in self.bones:
             bone.move(number)
@@ -154,7 +158,7 @@ class PbdSurface(MovingSurface):
 
 
 def constraints_of(setup: Setup, settings: PbdSettings) -> PbdConstraints:
-    """The constraints of the surface at rest, with edges that are softer along fibres."""
+    """The constraints of the surface at rest. With ``anisotropy``, edges along fibres are softer."""
     surface = setup.surface
     found = PbdConstraints.at_rest(surface.points, surface.triangles, setup.attached_vertices)
     if settings.anisotropy is None:
@@ -165,7 +169,10 @@ def constraints_of(setup: Setup, settings: PbdSettings) -> PbdConstraints:
 
 
 def sweep(points: Floats, at: PbdConstraints, stretch: float, volume: float, bending: float) -> None:
-    """Project all constraints once, each with the stiffness of its kind: ``points`` (n, 3) [mm] move in place."""
+    """Project all constraints once, which moves ``points`` (n, 3) [mm] in place.
+
+    ``stretch``, ``volume``, ``bending``: the stiffness of each kind of constraint.
+    """
     kernels.project_distances(points, at.inverse_masses, at.edges, at.lengths, stretch * at.share)
     kernels.project_volume(points, at.inverse_masses, at.triangles, at.six_volumes, volume)
     kernels.project_dihedrals(points, at.inverse_masses, at.hinges, at.angles, bending)
@@ -178,7 +185,7 @@ def advance(
     settings: PbdSettings,
     bones: Sequence[CollidingBone] = (),
 ) -> tuple[Floats, Floats]:
-    """Positions (n, 3) [mm] and ``displacement`` = dt v (n, 3) [mm] after one step of Algorithm 1, lines 8 to 20."""
+    """Positions (n, 3) [mm] and displacements dt v (n, 3) [mm] after one step, lines 8 to 20 of Algorithm 1."""
     moved = points + (1 - settings.damping) * displacement
     for _ in range(settings.solver_iterations):
         sweep(moved, constraints, settings.stretch, settings.volume, settings.bending)
@@ -189,7 +196,7 @@ def advance(
 
 _EXAMPLE = {"sub_iterations": 3, "solver_iterations": 2, "damping": 0.1, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
 
-# The algorithm of the report's text with the settings of its program.
+# The algorithm in the report's text with the settings of the report's program.
 _TABLE = TableRow(
     "PBD",
     "pbd",

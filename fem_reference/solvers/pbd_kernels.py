@@ -1,14 +1,15 @@
-"""The three constraints of position based dynamics, compiled: value, gradient and projection. Report section 5.5.3.
+"""Compiled values, gradients and projections of the three constraints of position based dynamics. Report section 5.5.3.
 
-A projection (``project_``) moves ``points`` (n, 3) [mm] in place by report eq. 5.14 weighted with the inverse masses w (n,),
-``dp_i = -stiffness w_i grad_i C / (sum_j w_j |grad_j C|^2) C``, one constraint after the other in the order of the
-arrays (Gauss-Seidel), so the result depends on this order. ``stiffness`` is the fraction of C that one projection removes, to first
-order. Arrays should be writable and C-contiguous: the loops are compiled again for any other kind.
+Functions whose name begins with ``project_`` move ``points`` (n, 3) [mm] in place, by eq. 5.14 of the report weighted with inverse
+masses w (n,): ``dp_i = -stiffness w_i grad_i C / (sum_j w_j |grad_j C|^2) C``. To first order, one projection removes the fraction
+``stiffness`` of C. Constraints are projected one after the other in the order of the arrays (Gauss-Seidel), so the result depends
+on this order. Arrays should be writable and C-contiguous; for any other layout the functions are compiled again.
 
-In extended position based dynamics (``pull_``; Macklin, Mueller and Chentanez 2016, DOI 10.1145/2994258.2994272) C stands for the
-energy ``C^2 / (2 alpha)`` with a compliance alpha. A projection moves points by ``dp_i = w_i grad_i C dl``, ``dl = -(C + a l) /
-(sum_j w_j |grad_j C|^2 + a)`` with w in 1/t (t: tonne) and ``a = alpha / dt^2`` (their eq. 18), and adds dl to the multiplier l,
-which starts a time step at 0: ``l / dt^2`` is the constraint's force. Only the path to the solution depends on the order.
+Functions whose name begins with ``pull_`` belong to extended position based dynamics (Macklin, Mueller and Chentanez 2016, DOI
+10.1145/2994258.2994272), in which a constraint C with the compliance alpha has the energy ``C^2 / (2 alpha)``. A projection moves
+points by ``dp_i = w_i grad_i C dl`` with ``dl = -(C + a l) / (sum_j w_j |grad_j C|^2 + a)`` and ``a = alpha / dt^2`` (eq. 18 of the
+paper); w is in 1/t (t: tonne). It adds dl to the multiplier l, which is 0 at the start of each time step; ``l / dt^2`` is the force
+of the constraint. Only the path to the solution depends on the order of the constraints.
 """
 
 import math
@@ -20,41 +21,41 @@ from fem_reference.solvers.compiled_kernels import compiled
 
 Vector = tuple[float, float, float]
 
-# Below this sine of a dihedral angle its gradient is rounding noise, and the pair counts as flat.
+# A pair of triangles counts as flat if the sine of its dihedral angle is below this, where the gradient is rounding noise.
 FLAT = 1e-5
-# One projection turns a pair by at most this angle [rad]. Points move along lines, not arcs, so a turn by t lengthens a triangle by
-# the fraction t^2 / 2; at pairs that are folded shut (t near pi) this would grow from pair to pair without bound.
+# The maximum change of a dihedral angle in one projection [rad]. Points move along straight lines instead of arcs, so a rotation by
+# t lengthens a triangle by the fraction t^2 / 2. For pairs that are folded shut (t near pi) this error would grow without bound.
 LARGEST_TURN = 0.3
 _ZERO = (0.0, 0.0, 0.0)
 
 
 @compiled
 def at(points: Floats, i: int) -> Vector:
-    """Point i."""
+    """The point with index ``i``."""
     return points[i, 0], points[i, 1], points[i, 2]
 
 
 @compiled
 def minus(a: Vector, b: Vector) -> Vector:
-    """``a - b``."""
+    """The difference ``a - b``."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @compiled
 def times(factor: float, a: Vector) -> Vector:
-    """``factor a``."""
+    """The product of a ``factor`` and a vector."""
     return factor * a[0], factor * a[1], factor * a[2]
 
 
 @compiled
 def dot(a: Vector, b: Vector) -> float:
-    """``a . b``."""
+    """The scalar product ``a . b``."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
 def cross(a: Vector, b: Vector) -> Vector:
-    """``a x b``."""
+    """The vector product ``a x b``."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
@@ -67,9 +68,9 @@ def move(points: Floats, i: int, factor: float, direction: Vector) -> None:
 
 @compiled
 def distance(p1: Vector, p2: Vector) -> tuple[float, Vector]:
-    """Distance of two points [mm] and its gradient at ``p1``; at ``p2`` it has the opposite sign. Eq. 5.15-5.17.
+    """The distance [mm] between two points and its gradient at ``p1``. Eq. 5.15-5.17.
 
-    The gradient is zero if the points coincide.
+    The gradient at ``p2`` has the opposite sign. If the points coincide, the gradient is zero.
     """
     apart = minus(p1, p2)
     length = math.sqrt(dot(apart, apart))
@@ -78,10 +79,10 @@ def distance(p1: Vector, p2: Vector) -> tuple[float, Vector]:
 
 @compiled
 def volume(points: Floats, triangles: Ints) -> tuple[float, Floats]:
-    """Six times the volume inside closed ``triangles`` (m, 3) [mm3] and its gradient (n, 3) [mm2]. Eq. 5.19-5.21.
+    """Six times the volume [mm3] inside closed ``triangles`` (m, 3), and its gradient (n, 3) [mm2]. Eq. 5.19-5.21.
 
-    Eq. 5.18 drops its 1/6 halfway; here neither value nor gradient has it. The origin is the mean of the points: this does not
-    change the volume of a closed surface, and reduces rounding.
+    Eq. 5.18 omits its factor 1/6 in part; here neither the value nor the gradient contains it. The mean of the points is the
+    origin, which reduces rounding errors and does not change the volume of a closed surface.
     """
     centre = (points[:, 0].mean(), points[:, 1].mean(), points[:, 2].mean())
     gradient = np.zeros_like(points)
@@ -99,11 +100,11 @@ def volume(points: Floats, triangles: Ints) -> tuple[float, Floats]:
 
 @compiled
 def dihedral(p1: Vector, p2: Vector, p3: Vector, p4: Vector) -> tuple[float, Vector, Vector, Vector, Vector]:
-    """Angle [rad] of triangles (p1, p2, p3) and (p1, p2, p4) about their edge p1-p2, and its gradients. Eq. 5.22-5.30.
+    """The dihedral angle [rad] between triangles (p1, p2, p3) and (p1, p2, p4), and its gradients at p1 to p4. Eq. 5.22-5.30.
 
-    The angle is pi for a flat pair, and does not distinguish the two senses of a fold. Gradients are zero where arccos has none: in
-    pairs that are flat, folded shut or without area. There arccos d loses half its digits, so the angle is computed as
-    atan2(sine, d). Eq. 5.26 needs eq. 5.30 transposed, and its ``n2 . (n2 x p2)`` is an outer product.
+    The angle is pi for a flat pair and does not depend on the side to which the pair is folded. Gradients are zero where arccos is
+    not differentiable: for pairs that are flat, folded shut or without area. Near these, arccos d would lose half of its digits, so
+    the angle is computed as atan2(sine, d). In eq. 5.26, eq. 5.30 must be transposed, and ``n2 . (n2 x p2)`` is an outer product.
     """
     e, a, b = minus(p2, p1), minus(p3, p1), minus(p4, p1)
     u1, u2 = cross(e, a), cross(e, b)
@@ -127,7 +128,7 @@ def dihedral(p1: Vector, p2: Vector, p3: Vector, p4: Vector) -> tuple[float, Vec
 
 @compiled
 def distances(points: Floats, edges: Ints) -> Floats:
-    """Length [mm] of each of the ``edges`` (e, 2)."""
+    """The lengths (e,) [mm] of ``edges`` (e, 2)."""
     found = np.empty(len(edges))
     for h in range(len(edges)):
         found[h] = distance(at(points, edges[h, 0]), at(points, edges[h, 1]))[0]
@@ -136,7 +137,7 @@ def distances(points: Floats, edges: Ints) -> Floats:
 
 @compiled
 def dihedrals(points: Floats, hinges: Ints) -> Floats:
-    """Angle [rad] of each of the ``hinges`` (e, 4): both ends of an edge, and the two vertices opposite."""
+    """The dihedral angles (e,) [rad] of ``hinges`` (e, 4): both ends of an edge, then the two vertices opposite the edge."""
     found = np.empty(len(hinges))
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
@@ -146,7 +147,7 @@ def dihedrals(points: Floats, hinges: Ints) -> Floats:
 
 @compiled
 def project_distances(points: Floats, inverse_masses: Floats, edges: Ints, rest: Floats, stiffness: Floats) -> None:
-    """Move the ends of each of the ``edges`` (e, 2) towards its length ``rest`` (e,) [mm], with its ``stiffness`` (e,)."""
+    """Project the length of each of the ``edges`` (e, 2) towards ``rest`` (e,) [mm], with the ``stiffness`` (e,) of the edge."""
     for h in range(len(edges)):
         i, j = edges[h, 0], edges[h, 1]
         weight = inverse_masses[i] + inverse_masses[j]
@@ -159,7 +160,7 @@ def project_distances(points: Floats, inverse_masses: Floats, edges: Ints, rest:
 
 @compiled
 def to_segment(p: Vector, start: Vector, end: Vector) -> float:
-    """Distance of the point ``p`` [mm] from the segment between ``start`` and ``end``, which must differ."""
+    """The distance [mm] of point ``p`` from the segment between the points ``start`` and ``end``, which must differ."""
     segment, off = minus(end, start), minus(p, start)
     share = min(1.0, max(0.0, dot(off, segment) / max(dot(segment, segment), 1e-300)))
     return distance(off, times(share, segment))[0]
@@ -167,9 +168,10 @@ def to_segment(p: Vector, start: Vector, end: Vector) -> float:
 
 @compiled
 def nearest_segments(points: Floats, starts: Floats, ends: Floats, within: float) -> Ints:
-    """The segment (n,) nearest to each of ``points`` (n, 3): the first of those ``within`` [mm] of the minimum distance.
+    """The index (n,) of the segment nearest to each of ``points`` (n, 3) [mm].
 
-    Segments go from ``starts`` (k, 3) to ``ends`` (k, 3) [mm].
+    Segments go from ``starts`` (k, 3) to ``ends`` (k, 3) [mm]. Segments whose distance exceeds the minimum by at most ``within``
+    [mm] count as equally near, and the first of them is returned.
     """
     found, distances = np.zeros(len(points), np.int64), np.empty(len(starts))
     for n in range(len(points)):
@@ -183,7 +185,7 @@ def nearest_segments(points: Floats, starts: Floats, ends: Floats, within: float
 
 @compiled
 def project_volume(points: Floats, inverse_masses: Floats, triangles: Ints, rest: float, stiffness: float) -> None:
-    """Move every point along the gradient of six times the volume, towards its value ``rest`` [mm3]."""
+    """Project six times the volume inside ``triangles`` (m, 3) towards ``rest`` [mm3]: all points move along its gradient."""
     value, gradient = volume(points, triangles)
     weight = 0.0
     for i in range(len(points)):
@@ -197,7 +199,7 @@ def project_volume(points: Floats, inverse_masses: Floats, triangles: Ints, rest
 
 @compiled
 def project_dihedrals(points: Floats, inverse_masses: Floats, hinges: Ints, rest: Floats, stiffness: float) -> None:
-    """Move the vertices of each of the ``hinges`` (e, 4) towards its angle ``rest`` (e,) [rad]."""
+    """Project the dihedral angle of each of the ``hinges`` (e, 4) towards ``rest`` (e,) [rad]."""
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
         angle, g1, g2, g3, g4 = dihedral(at(points, i), at(points, j), at(points, k), at(points, m))
@@ -213,7 +215,10 @@ def project_dihedrals(points: Floats, inverse_masses: Floats, hinges: Ints, rest
 
 @compiled
 def multiplier_step(value: float, weight: float, softness: float, multiplier: float) -> float:
-    """``dl`` of a constraint with this ``value``; 0 if none of its points can move."""
+    """The step ``dl`` of the ``multiplier`` l of a constraint with the ``value`` C; 0 if none of its points can move.
+
+    ``weight``: the sum of w_j |grad_j C|^2. ``softness``: the value a.
+    """
     if weight > 0:
         return -(value + softness * multiplier) / (weight + softness)
     return 0.0
@@ -223,7 +228,10 @@ def multiplier_step(value: float, weight: float, softness: float, multiplier: fl
 def pull_distances(
     points: Floats, inverse_masses: Floats, edges: Ints, rest: Floats, softness: Floats, multipliers: Floats
 ) -> None:
-    """Project the length of each of the ``edges`` (e, 2) once, ``rest`` (e,) [mm] at rest; ``softness`` a (e,) [1/t]."""
+    """Project the length of each of the ``edges`` (e, 2) once, and update its multiplier.
+
+    ``rest`` (e,) [mm]: lengths at rest. ``softness`` (e,) [1/t]: the value a of each edge.
+    """
     for h in range(len(edges)):
         i, j = edges[h, 0], edges[h, 1]
         length, direction = distance(at(points, i), at(points, j))
@@ -238,9 +246,9 @@ def pull_distances(
 def pull_volume(
     points: Floats, inverse_masses: Floats, triangles: Ints, rest: float, softness: float, multiplier: float
 ) -> float:
-    """Project six times the volume inside ``triangles`` (m, 3) once, ``rest`` [mm3] at rest; ``softness`` a [mm4/t].
+    """Project six times the volume inside ``triangles`` (m, 3) once. Returns the new multiplier.
 
-    Returns the new multiplier.
+    ``rest`` [mm3]: six times the volume at rest. ``softness`` [mm4/t]: the value a.
     """
     value, gradient = volume(points, triangles)
     weight = 0.0
@@ -257,9 +265,10 @@ def pull_volume(
 def pull_dihedrals(
     points: Floats, inverse_masses: Floats, hinges: Ints, rest: Floats, softness: Floats, multipliers: Floats
 ) -> None:
-    """Project the angle of each of the ``hinges`` (e, 4) once, ``rest`` (e,) [rad] at rest; ``softness`` a (e,) [1/(t mm2)].
+    """Project the dihedral angle of each of the ``hinges`` (e, 4) once, and update its multiplier.
 
-    As in position based dynamics, no projection turns a pair by more than ``LARGEST_TURN``.
+    ``rest`` (e,) [rad]: angles at rest. ``softness`` (e,) [1/(t mm2)]: the value a of each hinge. As in ``project_dihedrals``, one
+    projection changes an angle by at most ``LARGEST_TURN``.
     """
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]

@@ -1,34 +1,36 @@
-"""The report's own program for position based dynamics, reimplemented so that it reproduces the recorded output.
+"""The report's program for position based dynamics, reimplemented so that it reproduces the recorded output.
 
 The program (github.com/cervenkam/muscle-deformation-PBD) differs from the report's text, section 5.5.3 and Algorithm 1:
 
-- edges: each is projected twice in a sweep, as a half-edge of either triangle, vertex by vertex (text: one constraint)
-- attached vertices weigh as much as all others and are moved back after each step, so their share of a correction is lost
-  (text: their w is 0, line 2)
-- volume: its change is divided by 6 but its gradient is not, which removes a sixth of the error in a step (text:
-  eq. 5.18 to 5.21 drop the 6 in both)
-- folds: opened if they are sharper than at rest, never closed, and not changed if they are nearly flat or the correction would be
-  small or very large (text: eq. 5.22 keeps every angle)
-- one sweep over the constraints in each step; only then are collisions found (text: many sweeps, line 15; found first,
-  line 13)
-- time: each step of an iteration lasts as long as all steps together should (text: section 6.1 divides it), but without forces time
-  cancels
-- collisions: of vertices with voxels (text: section 6.1.1 has triangles), in the bone's frame at rest. Voxels that a flood fill
-  from one corner does not reach are inside. A vertex that was inside before moves by the bone's last motion, step after step, even
-  after the bone has come to rest; a vertex that enters is moved back in steps of one voxel; if two bones move a vertex, the later
-  bone takes precedence. Voxels are aligned with the axes at rest, and a single voxel decides where a vertex goes: if the scene is
-  rotated, vertices of the case hip_flexion differ by up to 57 mm (mean 4.5 mm; without voxels 1e-8 mm)
+- edges: each edge is projected twice in a sweep, once as a half-edge of each of its triangles, in the order of the vertices at
+  which half-edges start (text: one constraint)
+- attached vertices: they have the same mass as all other vertices and are moved back after each step, so their part of a correction
+  is lost (text: their w is 0, line 2)
+- volume: its change is divided by 6 but its gradient is not, so a step removes a sixth of the error (text: eq. 5.18 to 5.21 omit
+  the 6 in both)
+- folds: a fold is opened if it is sharper than at rest, and never closed; it is unchanged if it is nearly flat, or if the
+  correction would be small or very large (text: eq. 5.22 preserves each angle)
+- sweeps: each step has one sweep over the constraints, after which collisions are detected (text: many sweeps, line 15, and
+  collisions are detected first, line 13)
+- time: each step of an iteration has the duration of the iteration (text: section 6.1 divides it), but time cancels without forces
+- collisions: vertices collide with voxels (text: with triangles, section 6.1.1), in the frame of the bone at rest. Voxels that a
+  flood fill from one corner does not reach are inside. A vertex that was inside before the step moves by the last motion of the
+  bone, in every step, even after the bone has stopped; a vertex that enters is moved back in steps of one voxel; if two bones move
+  a vertex, the later bone takes precedence. Voxels are aligned with the axes at rest, and a single voxel can decide where a vertex
+  goes: if the scene is rotated, vertices of the case hip_flexion differ by up to 57 mm (mean 4.5 mm; without voxels 1e-8 mm)
 
 Frame number n is the state after iteration n.
 
-The recorded squeezed box is reproduced in all 300 iterations, to the last digit of its single precision. This requires the order
-of arithmetic of the program, so no projection is shared with ``pbd``: the squeezed box is chaotic, and a difference of 1e-15, at
-rest or from the order of a sum, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with its own flags, among
-them -Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by iteration 50). For the
-same reason a bone's pose is the product of its motions, and the rest angle of flat pairs has an error of 2e-8 rad.
+The recorded squeezed box is reproduced in all 300 iterations, to the last digit in single precision. This requires the program's
+order of arithmetic operations, so the projections of ``pbd`` cannot be used here. The squeezed box is chaotic: a difference of
+1e-15, at rest or from the order of a sum, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with the
+program's flags, among them -Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by
+iteration 50). For the same reason the pose of a bone is the product of its motions, and the rest angle of flat pairs has an error
+of 2e-8 rad.
 
-Two things differ from the program: the scene defines the attached vertices (in the program, all vertices in the voxels of a bone at
-rest), and a fibre's direction follows its own points (in the program, points of several fibres).
+This solver differs from the program in two respects. The scene defines the attached vertices, whereas the program attaches all
+vertices in the voxels of a bone at rest. The direction of a fibre follows its points, whereas the program mixes points of several
+fibres.
 """
 
 from collections.abc import Sequence
@@ -50,20 +52,20 @@ from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import PbdConstraints, along_fibres
 from fem_reference.solvers.pbd_kernels import distances
 
-# The time step [s]; it cancels, up to rounding.
+# The time step [s], which cancels up to rounding.
 STEP = 1e-3
-# Decimal places to which the motion between two poses is rounded, so that 90 mm in 100 iterations is exactly 0.9 mm in each.
+# The number of decimal places to which the motion between two poses is rounded: 90 mm in 100 iterations is exactly 0.9 mm in each.
 DIGITS = 12
 
 
 class ProgramSettings(Record):
-    """Settings of the program; every key is required except the keys that add an effect.
+    """Settings of the program; every key is required except ``voxels`` and ``anisotropy``.
 
-    ``sub_iterations``: steps in each iteration, 3 in section 6.1 of the report. ``damping``: the fraction of every velocity that
-    is lost in a step, 0.01 in the program. ``bending``: a factor on the correction of a dihedral angle, 0.9 in the program.
-    ``voxels``: their number along each side of a bone's bounding box, 64 in the program; without this key there is no contact.
-    ``anisotropy`` a: the stiffness of an edge is (1 - |cos|)^a, with the cosine of its angle to the nearest fibre; a = 1 in the
-    program. Without this key the stiffness is 1, as in the program without fibres.
+    ``sub_iterations``: the number of steps in each iteration, 3 in section 6.1 of the report. ``damping``: the fraction of each
+    velocity that is lost in a step, 0.01 in the program. ``bending``: a factor on the correction of dihedral angles, 0.9 in the
+    program. ``voxels``: the number of voxels along each side of a bone's bounding box, 64 in the program; without this key there is
+    no contact. ``anisotropy``: the exponent a in the stiffness (1 - |cos|)^a of an edge, with the cosine of the angle between the
+    edge and the nearest fibre; a = 1 in the program. Without this key the stiffness is 1, as in the program without fibres.
     """
 
     sub_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10))]
@@ -75,7 +77,11 @@ class ProgramSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class Voxels:
-    """A box of k^3 voxels: the mask ``inside`` (k, k, k) of a bone, the ``lower`` corner (3,), and a voxel's ``size`` (3,) [mm]."""
+    """A bone as a box of k^3 voxels.
+
+    ``inside`` (k, k, k): a mask of the voxels inside the bone. ``lower`` (3,) [mm]: the lower corner of the box. ``size`` (3,)
+    [mm]: the size of a voxel.
+    """
 
     inside: NDArray[np.bool_]
     lower: Floats
@@ -83,7 +89,7 @@ class Voxels:
 
     @classmethod
     def of(cls, surface: Surface, count: int) -> "Voxels":
-        """The ``count``^3 voxels in the box around a bone; if the box is flat they are 1 mm thick."""
+        """The ``count``^3 voxels in the bounding box of a bone; in a direction in which the box is flat they are 1 mm thick."""
         points, border = np.array(surface.points), np.zeros((count,) * 3, np.bool_)
         size = np.ptp(points, axis=0) / count
         empty = cls(border, points.min(axis=0), np.where(size > 0, size, 1.0))
@@ -91,18 +97,19 @@ class Voxels:
         return replace(empty, inside=~kernels.flood(border))
 
     def places(self, points: Floats) -> Floats:
-        """Points (n, 3) [mm] as positions in units of voxels from the lower corner."""
+        """The positions (n, 3) [voxels] of ``points`` (n, 3) [mm], relative to the lower corner."""
         return (points - self.lower) * (1 / self.size)
 
     def points(self, places: Floats) -> Floats:
-        """Positions ``places`` (n, 3) in units of voxels from the lower corner as points [mm]."""
+        """The points (n, 3) [mm] at the positions ``places`` (n, 3) [voxels], relative to the lower corner."""
         return places * self.size + self.lower
 
 
 class VoxelBone:
-    """The ``voxels`` of a bone in its rest pose, its present ``pose``, and its ``last`` motion that was not zero; both 4 x 4.
+    """A bone of voxels that moves.
 
-    The pose is the product of all motions, as in the program; it differs from the ``given`` pose by rounding.
+    ``voxels``: the voxels of the bone at rest. ``pose`` (4, 4): the present pose, which is the product of all motions, as in the
+    program, and differs from the ``given`` pose by rounding. ``last`` (4, 4): the last motion between two different poses.
     """
 
     def __init__(self, body: Bone, count: int, frame: int) -> None:
@@ -118,7 +125,7 @@ class VoxelBone:
             self.given, self.pose = given, self.last @ self.pose
 
     def move_out(self, reached: Floats, starts: Floats, goals: Floats) -> None:
-        """Correct, in place, the positions ``reached`` (n, 3) [mm] of vertices on their way from ``starts`` to ``goals`` (n, 3)."""
+        """Correct, in place, the positions ``reached`` (n, 3) [mm] of vertices that move from ``starts`` to ``goals`` (n, 3)."""
         back, voxels = np.linalg.inv(self.pose), self.voxels
         before, after = apply(back, starts), apply(back, goals)
         first, last = voxels.places(before), voxels.places(after)
@@ -131,15 +138,16 @@ class VoxelBone:
 
 
 def half_edges_of(triangles: Ints) -> Ints:
-    """The sides of all triangles, (3 m, 2), ordered by the vertices at which they start, then by triangles."""
+    """The half-edges (3 m, 2) of ``triangles`` (m, 3), ordered by their start vertex and then by triangle."""
     sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     return np.asarray(sides[np.argsort(sides[:, 0], kind="stable")])
 
 
 def hinges_of(points: Floats, triangles: Ints) -> tuple[Ints, Floats]:
-    """The hinges (e, 4) of a closed surface and their angles (e,) [rad], one per edge, in the order of its later triangle.
+    """The hinges (e, 4) of a closed surface and their dihedral angles (e,) [rad].
 
-    A hinge: both ends of the edge, then the vertices opposite the edge in the earlier and in the later of its triangles.
+    There is one hinge for each edge, in the order of the later of its two triangles. A hinge lists both ends of the edge, the
+    opposite vertex in the earlier triangle, and the opposite vertex in the later triangle.
     """
     opposite, starts, ends = (np.roll(triangles, -corner, axis=1).ravel() for corner in range(3))
     sides = np.lexsort((np.maximum(starts, ends), np.minimum(starts, ends))).reshape(-1, 2)
@@ -150,7 +158,7 @@ def hinges_of(points: Floats, triangles: Ints) -> tuple[Ints, Floats]:
 
 
 def constraints_of(setup: Setup, settings: ProgramSettings) -> PbdConstraints:
-    """The constraints of the surface at rest; every vertex weighs the same."""
+    """The constraints of the surface at rest. All vertices have the same mass."""
     points, triangles = np.array(setup.surface.points), np.array(setup.surface.triangles)
     edges, (hinges, angles) = half_edges_of(triangles), hinges_of(points, triangles)
     share = np.ones(len(edges))
@@ -171,12 +179,12 @@ def constraints_of(setup: Setup, settings: ProgramSettings) -> PbdConstraints:
 
 
 def solve(setup: Setup, settings: ProgramSettings, sink: Sink) -> Outcome:
-    """Iterate from rest at the first of ``setup.frames`` to the last of them; each requested frame goes into ``sink``."""
+    """Iterate from rest at the first of ``setup.frames`` to the last; each requested frame goes to ``sink``."""
     return follow(timed(ProgramSurface, setup, settings), setup, sink)
 
 
 class ProgramSurface(MovingSurface):
-    """A surface with its constraints, the ``velocity`` (n, 3) [mm/s] of its vertices, and bones of voxels."""
+    """A surface with its constraints, the ``velocity`` (n, 3) [mm/s] of its vertices, and ``bones`` that consist of voxels."""
 
     def __init__(self, setup: Setup, settings: ProgramSettings) -> None:
         super().__init__(setup)
@@ -187,7 +195,7 @@ class ProgramSurface(MovingSurface):
         self.cost["projections"] = 0.0
 
     def move(self, number: int) -> None:
-        """Run one iteration."""
+        """Run one iteration, up to frame ``number``."""
         carry(self.points, self.setup, number)
         for bone in self.bones:
             bone.move(number)
@@ -203,14 +211,14 @@ class ProgramSurface(MovingSurface):
 
 
 def project(points: Floats, at: PbdConstraints, bending: float) -> None:
-    """One sweep over the constraints, which moves ``points`` (n, 3) [mm] in place."""
+    """Sweep once over all constraints, which moves ``points`` (n, 3) [mm] in place."""
     kernels.project_edges(points, at.edges, at.lengths, at.share)
     kernels.project_volume(points, at.triangles, at.six_volumes)
     kernels.project_folds(points, at.hinges, at.angles, bending)
 
 
 def collided(starts: Floats, goals: Floats, bones: Sequence[VoxelBone]) -> Floats:
-    """The positions (n, 3) [mm] that vertices on their way from ``starts`` to ``goals`` (n, 3) reach among ``bones``."""
+    """The positions (n, 3) [mm] of vertices that move from ``starts`` to ``goals`` (n, 3) [mm] and may collide with ``bones``."""
     reached = goals.copy()
     for bone in bones:
         bone.move_out(reached, starts, goals)

@@ -1,8 +1,8 @@
-"""The report's own program, compiled, with its order of summation. It opens folds but never closes them, and its bones are voxels.
+"""Compiled functions of the report's program for position based dynamics, with the same order of summation.
 
-The code follows the program's source. As the result is chaotic, the last digit matters: each sum has the order that gcc 12 produces
-with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than SSE2), as
-found in the machine code. Do not simplify the sums. For arrays that are not writable and C-contiguous, loops are compiled again.
+The code follows the source of the program. The result is chaotic, so the last digit matters: terms are summed in the order found in
+the machine code from gcc 12 with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no
+vectors wider than SSE2). Do not simplify the sums. Functions are compiled again for arrays that are not writable and C-contiguous.
 """
 
 import math
@@ -13,31 +13,34 @@ from fem_reference.foundations.mesh import Bools, Floats, Ints
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import Vector, at, cross, dot, minus, move, times
 
-# A pair of triangles is not changed if the cosine of the angle between their normals exceeds this in magnitude.
+# A pair of triangles is left unchanged if the cosine of the angle between their normals exceeds this in magnitude.
 FLAT_COSINE = 1 - 1e-10
-# A fold is corrected only if the ratio of the correction to its gradient is in this range.
+# A fold is corrected only if the ratio of the displacements to the gradients of the cosine is in this range.
 SMALLEST_RATIO, GREATEST_RATIO = 0.1, 10.0
-# The sum of the squared gradients of a fold is taken to be at least this [1/mm2].
+# The lower bound of the sum of the squared gradients of a fold [1/mm2].
 SMALLEST_WEIGHT = 1e-4
-# The diagonal of a voxel as the program computes it, in voxels.
+# The diagonal of a voxel [voxels], as the program computes it.
 DIAGONAL = math.sqrt(3) + 1e-3
 
 
 @compiled
 def plus(a: Vector, b: Vector) -> Vector:
-    """``a + b``."""
+    """The sum ``a + b``."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @compiled
 def add_dot(total: float, a: Vector, b: Vector) -> float:
-    """``total + a . b``, the last component first."""
+    """The sum ``total + a . b``, beginning with the product of the last components."""
     return (total + a[2] * b[2]) + (a[0] * b[0] + a[1] * b[1])
 
 
 @compiled
 def project_edges(points: Floats, edges: Ints, rest: Floats, stiffness: Floats) -> None:
-    """Move the ends of each of the ``edges`` (e, 2) towards its length ``rest`` (e,) [mm], with its ``stiffness`` (e,)."""
+    """Move the ends of each of the ``edges`` (e, 2) so that the fraction ``stiffness`` (e,) of the error of its length is removed.
+
+    ``rest`` (e,) [mm]: the lengths at rest.
+    """
     for h in range(len(edges)):
         i, j = edges[h, 0], edges[h, 1]
         apart = minus(at(points, i), at(points, j))
@@ -48,7 +51,7 @@ def project_edges(points: Floats, edges: Ints, rest: Floats, stiffness: Floats) 
 
 @compiled
 def six_volumes(points: Floats, triangles: Ints) -> tuple[float, Floats]:
-    """Six times the volume inside closed ``triangles`` (m, 3) [mm3], about the origin, and its gradient (n, 3) [mm2]."""
+    """Six times the volume [mm3] inside closed ``triangles`` (m, 3), summed about the origin, and its gradient (n, 3) [mm2]."""
     gradient, value = np.zeros_like(points), 0.0
     for t in range(len(triangles)):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -63,7 +66,10 @@ def six_volumes(points: Floats, triangles: Ints) -> tuple[float, Floats]:
 
 @compiled
 def project_volume(points: Floats, triangles: Ints, rest: float) -> None:
-    """Move every point along the gradient of six times the volume, towards ``rest`` [mm3]; a sixth of the error is removed."""
+    """Move all points along the gradient of six times the volume, towards its value ``rest`` [mm3] at rest.
+
+    To first order, this removes a sixth of the error.
+    """
     value, gradient = six_volumes(points, triangles)
     weight = 0.0
     for i in range(len(points)):
@@ -76,7 +82,7 @@ def project_volume(points: Floats, triangles: Ints, rest: float) -> None:
 
 @compiled
 def normals_of(points: Floats, triangles: Ints) -> Floats:
-    """The unit normal of each of ``triangles`` (m, 3); zero if there is none."""
+    """The unit normals (m, 3) of ``triangles`` (m, 3); zero for a triangle without area."""
     found = np.empty((len(triangles), 3))
     for t in range(len(triangles)):
         a, b, c = at(points, triangles[t, 0]), at(points, triangles[t, 1]), at(points, triangles[t, 2])
@@ -86,7 +92,7 @@ def normals_of(points: Floats, triangles: Ints) -> Floats:
 
 @compiled
 def angles_of(normals: Floats, pairs: Ints) -> Floats:
-    """Angle [rad] of the triangles in each of ``pairs`` (e, 2) about their edge: pi if they are flat, or nearly flat."""
+    """The dihedral angles (e,) [rad] between the triangles of each of ``pairs`` (e, 2): pi for a flat or nearly flat pair."""
     found = np.empty(len(pairs))
     for h in range(len(pairs)):
         cosine = dot(at(normals, pairs[h, 0]), at(normals, pairs[h, 1]))
@@ -96,16 +102,19 @@ def angles_of(normals: Floats, pairs: Ints) -> Floats:
 
 @compiled
 def _turn(point: Vector, other: Vector, own: Vector, cosine: float) -> Vector:
-    """``point x other + cosine own x point``, a term in the gradients of the cosine between two unit normals (Mueller 2007)."""
+    """The vector ``point x other + cosine own x point``: in Mueller 2007, a term in the gradients of the cosine between the unit
+    normals ``own`` and ``other``.
+    """
     return plus(cross(point, other), times(cosine, cross(own, point)))
 
 
 @compiled
 def _gradients(e: Vector, a: Vector, b: Vector) -> tuple[float, Vector, Vector, Vector, Vector]:
-    """Cosine of the angle between the normals of triangles (0, e, a) and (0, e, b), and the q of Mueller 2007, appendix A, at 0, e,
-    a and b: at 0, a and b the negative gradient [1/mm], at e the gradient.
+    """The cosine of the angle between the normals of triangles (0, e, a) and (0, e, b), and four vectors q [1/mm].
 
-    For the last component at e the compiler sums the norms of the normals in another order.
+    The vectors are defined in Mueller 2007, appendix A. They belong to 0, e, a and b, in this order: the negative gradient of the
+    cosine at 0, a and b, and its gradient at e. For the last component at e, the compiler sums the squares in the norms of the
+    normals in a different order.
     """
     u1, u2 = cross(e, a), cross(e, b)
     r1 = 1 / math.sqrt((u1[2] * u1[2] + u1[0] * u1[0]) + u1[1] * u1[1])
@@ -123,7 +132,7 @@ def _gradients(e: Vector, a: Vector, b: Vector) -> tuple[float, Vector, Vector, 
 
 @compiled
 def _squares(q1: Vector, q2: Vector, q3: Vector, q4: Vector) -> float:
-    """The sum of the squares of four vectors."""
+    """The sum of the squared lengths of four vectors."""
     third = (q3[2] * q3[2] + q4[2] * q4[2]) + (q3[0] * q3[0] + q3[1] * q3[1])
     fourth = (q4[0] * q4[0] + q4[1] * q4[1]) + (q2[0] * q2[0] + q2[1] * q2[1])
     first = (q1[0] * q1[0] + q1[1] * q1[1]) + (q1[2] * q1[2] + q2[2] * q2[2])
@@ -132,9 +141,10 @@ def _squares(q1: Vector, q2: Vector, q3: Vector, q4: Vector) -> float:
 
 @compiled
 def project_folds(points: Floats, hinges: Ints, rest: Floats, factor: float) -> None:
-    """Open each of the ``hinges`` (h, 4) that is folded more sharply than its angle ``rest`` (h,) [rad], as in Mueller 2007.
+    """Open each of the ``hinges`` (h, 4) whose dihedral angle is less than its ``rest`` angle (h,) [rad], as in Mueller 2007.
 
-    Points move by ``ratio`` times the negative gradient of the cosine; a fold whose ratio is too small or too large stays.
+    Points move by ``ratio``, which contains the ``factor``, times the negative gradient of the cosine. A hinge is left unchanged if
+    ``ratio`` is too small or too large.
     """
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
@@ -153,7 +163,7 @@ def project_folds(points: Floats, hinges: Ints, rest: Floats, factor: float) -> 
 
 @compiled
 def _unit_normal(a: Vector, b: Vector) -> Vector:
-    """The unit vector along a x b; zero if there is none."""
+    """The unit vector along a x b; zero if this product is almost zero."""
     normal = cross(a, b)
     size = math.sqrt(dot(normal, normal))
     return times(1 / size, normal) if size > 1e-10 else (0.0, 0.0, 0.0)
@@ -161,7 +171,7 @@ def _unit_normal(a: Vector, b: Vector) -> Vector:
 
 @compiled
 def _is_inside(inside: Bools, place: Vector) -> bool:
-    """True if a ``place``, in voxels, lies in a voxel inside the bone."""
+    """True if the position ``place`` [voxels] is in a voxel inside the bone."""
     x, y, z = place
     count = len(inside)
     return 0 <= x < count and 0 <= y < count and 0 <= z < count and inside[int(x), int(y), int(z)]
@@ -169,10 +179,11 @@ def _is_inside(inside: Bools, place: Vector) -> bool:
 
 @compiled
 def _marks(a: Vector, b: Vector, c: Vector, normal: Vector, corner: Vector) -> bool:
-    """True if the triangle a, b, c, in voxels, marks the voxel whose lower corner is ``corner``.
+    """True if the triangle with vertices a, b, c [voxels] marks the voxel whose lower corner is ``corner``.
 
-    The triangle marks the voxel if its plane is near and the corner is not beyond any of its edges by more than a diagonal. The
-    planes at the edges are made with its ``normal`` in mm, although voxels are not cubes.
+    The triangle marks the voxel if its plane is at most half a diagonal from the corner, and the corner is beyond no edge of the
+    triangle by more than a diagonal. The planes through the edges contain ``normal``, which is computed in mm although voxels are
+    not cubes.
     """
     away = _unit_normal(minus(b, a), minus(c, a))
     if abs(dot(away, minus(corner, a))) > DIAGONAL / 2:
@@ -185,7 +196,10 @@ def _marks(a: Vector, b: Vector, c: Vector, normal: Vector, corner: Vector) -> b
 
 @compiled
 def mark(border: Bools, points: Floats, places: Floats, triangles: Ints) -> None:
-    """Set ``border`` (k, k, k) where one of the ``triangles`` (m, 3) marks it; ``points`` [mm] are at ``places`` in voxels."""
+    """Set the entries of ``border`` (k, k, k) for voxels that one of the ``triangles`` (m, 3) marks.
+
+    ``points`` (n, 3) [mm] and ``places`` (n, 3) [voxels] are the same vertices in different units.
+    """
     count = len(border)
     for t in range(len(triangles)):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -201,7 +215,10 @@ def mark(border: Bools, points: Floats, places: Floats, triangles: Ints) -> None
 
 @compiled
 def flood(border: Bools) -> Bools:
-    """The voxels (k, k, k) that a flood from (0, 0, 0) reaches outside the ``border`` through faces, without steps to index 0."""
+    """A mask (k, k, k) of the voxels outside ``border`` that a flood fill from (0, 0, 0) reaches through faces.
+
+    As in the program, the flood fill takes no step to a voxel with index 0.
+    """
     outside = np.zeros(border.shape, np.bool_)
     found = np.zeros((border.size, 3), np.int64)
     outside[0, 0, 0] = not border[0, 0, 0]
@@ -222,7 +239,7 @@ def flood(border: Bools) -> Bools:
 
 @compiled
 def are_inside(inside: Bools, places: Floats) -> Bools:
-    """True (n,) for ``places`` (n, 3), in voxels, that lie in a voxel inside the bone."""
+    """A mask (n,) of the positions ``places`` (n, 3) [voxels] that are in a voxel inside the bone."""
     found = np.empty(len(places), np.bool_)
     for i in range(len(places)):
         found[i] = _is_inside(inside, at(places, i))
@@ -231,9 +248,11 @@ def are_inside(inside: Bools, places: Floats) -> Bools:
 
 @compiled
 def march_out(inside: Bools, goals: Floats, displacements: Floats) -> tuple[Floats, Bools]:
-    """The end places (n, 3) of points that are inside at ``goals`` (n, 3), and a mask (n,) of points that went too far; in voxels.
-    Points move along their ``displacements`` (n, 3), which point back to the start, in steps of 1, until they are outside; too far
-    means more than 1 beyond the length of the displacement.
+    """Move points that are inside a bone back along their path. Returns their final positions (n, 3) and a mask (n,), in voxels.
+
+    ``goals`` (n, 3): positions inside the bone. ``displacements`` (n, 3): vectors from there back to the start of the step. Points
+    move along them in steps of 1 until they are outside the bone. The mask is True for points that travel more than 1 farther than
+    the length of their displacement.
     """
     reached, too_far = goals.copy(), np.empty(len(goals), np.bool_)
     for i in range(len(goals)):

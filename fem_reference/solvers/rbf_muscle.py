@@ -1,15 +1,15 @@
-"""An implicit muscle of a few Gaussians that move with the bones: the goal of section 7.1 of the report.
+"""An implicit muscle surface, represented by a few Gaussians that follow the bones: the goal of section 7.1 of the report.
 
-The surface at rest is fitted by Gaussians with four parameters each (``geometry.gaussian_surface``). At each frame number
+The surface at rest is approximated by Gaussians with four parameters each (``geometry.gaussian_surface``). At each frame number
 
-- the centres, and a few points of each attachment that move with its bone, move as rigidly as possible relative to their neighbours
-  (eq. 5.10 on a graph of tens of nodes);
-- centres are pushed away from bones that the surface has entered, and vertices that are still inside are moved out;
-- each radius shrinks by the square root of the stretch along the muscle around its centre, as stretched fibres become thin; all
-  radii are scaled together until the enclosed volume is the rest volume.
+- a few points of each attachment move with the bone, and the centres of the Gaussians are positioned so that each node of this
+  graph moves as rigidly as possible with its neighbours (eq. 5.10 on a graph of tens of nodes);
+- centres are pushed away from bones that the surface has entered, and vertices that are still inside a bone are moved out;
+- each radius is divided by the square root of the stretch along the muscle near its centre, as stretched fibres become thinner;
+  then a common factor on all radii restores the volume at rest.
 
-A vertex moves with the Gaussians that form the surface around it, and is then moved to the level of the implicit function that it
-had at rest, so the error of the fit does not change. Attached vertices are exact.
+A vertex moves with the Gaussians that form the surface around it. It is then moved to the level of the implicit function that it
+had at rest, so the error of the fit does not change. Attached vertices move exactly with their bones.
 """
 
 from dataclasses import dataclass
@@ -36,13 +36,15 @@ from fem_reference.solvers.pbd_kernels import volume
 
 # The number of neighbours of a node, and the number of nodes in an attachment.
 _AROUND, _HANDLES = 8, 12
-# The number of rounds in which centres are pushed out of bones, and in which radii are scaled.
+# The number of rounds that push centres out of bones, and the number of rounds that scale radii.
 _PUSHES, _SCALINGS = 4, 3
 
 
 class RbfSettings(Record):
-    """``gaussians``: their number; each has four parameters. ``iterations``: local and global steps for each frame number.
-    ``volume``: preserve the volume by changing the radii. ``contact``: avoid bones; by default off.
+    """Settings of the implicit surface.
+
+    ``gaussians``: the number of Gaussians, each with four parameters. ``iterations``: the number of local and global steps at each
+    frame number. ``volume``: preserve the enclosed volume by scaling the radii. ``contact``: push the muscle out of bones.
     """
 
     gaussians: Annotated[int, Field(ge=2), Trade((10, 30, 100))]
@@ -53,8 +55,10 @@ class RbfSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
-    """Nodes (k, 3) that move as rigidly as possible with their neighbours in ``cells``: first the ``free`` centres (their number),
-    then the points of attachments, whose positions are given. ``system``: the global step.
+    """A graph of ``nodes`` (k, 3) [mm], given at rest, each of which moves as rigidly as possible with its neighbours.
+
+    The first ``free`` nodes are centres of Gaussians. The remaining nodes are points of attachments with prescribed positions.
+    ``cells``: the neighbours of each node. ``system``: the global step of ARAP.
     """
 
     nodes: Floats
@@ -64,7 +68,10 @@ class Cloud:
 
     @staticmethod
     def of(centres: Floats, given: Floats) -> "Cloud":
-        """The cloud of free ``centres`` (m, 3) and ``given`` points (k - m, 3), each with its nearest neighbours."""
+        """The graph of free ``centres`` (m, 3) and prescribed points ``given`` (k - m, 3), each connected to its neighbours.
+
+        Raises InputError if some centres are not connected to any attachment.
+        """
         nodes, free = np.concatenate([centres, given]), len(centres)
         count = len(nodes)
         _, near = cKDTree(nodes).query(nodes, k=min(_AROUND + 1, count))
@@ -80,24 +87,24 @@ class Cloud:
         return Cloud(nodes, free, cells, system)
 
     def gradients(self, now: Floats) -> Floats:
-        """The sum (k, 3, 3) over the edges at each node of the outer product of the present edge and the edge at rest."""
+        """Sums (k, 3, 3), for each node, of the outer products of its edges between the positions ``now`` and its edges at rest."""
         one, other = np.repeat(np.arange(len(now)), np.diff(self.cells.starts)), self.cells.neighbours
         found = np.zeros((len(now), 3, 3))
         np.add.at(found, one, (now[one] - now[other])[:, :, None] * (self.nodes[one] - self.nodes[other])[:, None])
         return found
 
     def rotations(self, now: Floats) -> Floats:
-        """The rotation (k, 3, 3) around each node."""
+        """The rotations (k, 3, 3) of the cells of the nodes at the positions ``now`` (k, 3)."""
         return fit_rotations(now, self.cells)
 
     def relax(self, now: Floats, iterations: int) -> Floats:
-        """Nodes (k, 3) after local and global steps from ``now``."""
+        """Positions (k, 3) [mm] of the nodes after local and global steps that start from the positions ``now`` (k, 3)."""
         for _ in range(iterations):
             now = self.system.place(now, self.rotations(now))
         return now
 
     def stretch(self, now: Floats, along: Floats) -> Floats:
-        """The stretch (k,) around each node along directions (k, 3) at rest."""
+        """The stretch (k,) near each node in the directions ``along`` (k, 3) at rest, for nodes at the positions ``now`` (k, 3)."""
         spread = self.gradients(self.nodes)
         small = 1e-3 * np.trace(spread, axis1=1, axis2=2)[:, None, None] * np.eye(3)
         gradients = (self.gradients(now) + self.rotations(now) @ small) @ np.linalg.inv(spread + small)
@@ -105,7 +112,7 @@ class Cloud:
 
 
 class RbfMuscle(MovingSurface):
-    """The muscle, moved from each frame number to the next."""
+    """The muscle as an implicit surface, advanced from each frame number to the next."""
 
     advice = "a slower motion, more iterations, or contact = false, may help"
 
@@ -125,10 +132,10 @@ class RbfMuscle(MovingSurface):
         self.volume = enclosed_volume(rest.points, rest.triangles)
         self.nodes = self.cloud.nodes
         self.cost["unknowns"] = 4.0 * settings.gaussians
-        self.cloud.relax(self.nodes, 1)  # compiles the code here, outside the time of the first frame
+        self.cloud.relax(self.nodes, 1)  # compiles the code, so that this time is not part of the first frame
 
     def move(self, number: int) -> None:
-        """Move the muscle to frame ``number``."""
+        """Advance the muscle to frame ``number``."""
         count, setup, rest = self.cloud.free, self.setup, self.fitted
         poses = zip(setup.attached, self.handles, strict=True)
         given = [apply(entry.bone.pose(number), setup.surface.points[handles]) for entry, handles in poses]
@@ -143,14 +150,14 @@ class RbfMuscle(MovingSurface):
         self.points, self.nodes = self._settled(GaussianSurface(nodes[:count], radii), points, number), nodes
 
     def _carried(self, nodes: Floats) -> Floats:
-        """Vertices (n, 3) carried by the Gaussians, each of which moves rigidly."""
+        """Positions (n, 3) [mm] of vertices that move with the Gaussians around them, given the positions ``nodes`` (k, 3)."""
         turns, count = self.cloud.rotations(nodes), self.cloud.free
         shifts = nodes[:count] - np.einsum("mij,mj->mi", turns[:count], self.fitted.centres)
         turned = np.einsum("nij,nj->ni", np.tensordot(self.shares, turns[:count], 1), self.setup.surface.points)
         return np.asarray(turned + self.shares @ shifts)
 
     def _pushes(self, points: Floats, number: int) -> Floats:
-        """The displacement (n, 3) [mm] of each vertex out of the bone that contains it."""
+        """The displacements (n, 3) [mm] that move vertices at ``points`` (n, 3) out of bones; 0 for a vertex outside all bones."""
         found, free = np.zeros_like(points), np.flatnonzero(self.setup.free)
         for bone in self.setup.bones:
             pose = bone.pose(number)
@@ -159,16 +166,19 @@ class RbfMuscle(MovingSurface):
         return found
 
     def _settled(self, moved: GaussianSurface, points: Floats, number: int) -> Floats:
-        """Vertices (n, 3) on their levels and outside bones, attached vertices at their bones, with the rest volume."""
+        """Positions (n, 3) [mm] of vertices that start from ``points`` (n, 3) and move to their levels of the implicit function.
+
+        Attached vertices follow their bones. Depending on the settings, the volume is that at rest, and vertices are outside bones.
+        """
         scale = 1.0
         for _ in range(_SCALINGS if self.settings.volume else 1):
             points = GaussianSurface(moved.centres, scale * moved.radii).project(points, self.level)
             bony = points.copy()
             carry(bony, self.setup, number)
             points += self.beside[:, None] * (bony - points)[self.nearest]
-            carry(points, self.setup, number)  # exactly, even if the surface of the Gaussians is far away
+            carry(points, self.setup, number)  # attached vertices are exact, even if the implicit surface is far away
             scale *= float(np.cbrt(self.volume / enclosed_volume(points, self.setup.surface.triangles)))
-        if self.settings.volume:  # free vertices correct the remaining error, along the gradient of the volume
+        if self.settings.volume:  # moving free vertices along the gradient of the volume corrects the remaining error
             six, gradient = volume(points, self.setup.surface.triangles)
             gradient[self.setup.attached_vertices] = 0
             points += gradient * (6 * self.volume - six) / float((gradient**2).sum())
@@ -177,12 +187,12 @@ class RbfMuscle(MovingSurface):
         return points
 
     def ending(self) -> Outcome:
-        """Converged: a fixed number of steps finds every state."""
+        """The outcome, always *converged*, as each state takes a fixed number of steps."""
         return Outcome("converged", f"{self.settings.gaussians} Gaussians, {4 * self.settings.gaussians} parameters")
 
 
 def solve(setup: Setup, settings: RbfSettings, sink: Sink) -> Outcome:
-    """Compute the muscle at every frame number."""
+    """Compute the muscle at every frame number. Raises InputError if the muscle has no attachments."""
     if not setup.attached:
         raise InputError("rbf_muscle", "a muscle without attachments", "attachments whose bones move it")
     return follow(RbfMuscle(setup, settings), setup, sink)

@@ -1,4 +1,4 @@
-"""A sequence of deformed surfaces that another program computed, read from files and checked against the scene."""
+"""A solver that reads deformed surfaces, computed by another program, from files and checks them against the scene."""
 
 import hashlib
 import logging
@@ -26,16 +26,17 @@ from fem_reference.solvers.common.protocol import MuscleSolver
 
 log = logging.getLogger(__name__)
 
-# Maximum distance [mm] (rms) of the first frame from the rest surface without a warning: above the rounding of any format.
+# The distance [mm] (rms) of the first frame from the rest surface above which there is a warning; rounding in any format is less.
 AT_REST = 0.1
-# Maximum allowed distance, in diagonals of the rest surface's bounding box: more than solvers move points in their first frame,
-# less than a wrong unit does (at a tenth of the size, points are at least 0.9 rms radii away, 0.26 diagonals for a sphere).
+# The maximum allowed distance, in diagonals of the bounding box of the rest surface: more than solvers move points in their first
+# frame, and less than the effect of a wrong unit (at a tenth of the size, the rms distance is at least 0.9 times the rms radius,
+# which is 0.26 diagonals for a sphere).
 NEAR_REST = 0.05
-# The minimum size of a frame relative to rest: no solver shrinks a body so far, but a frame in m has 1/1000 of the size in mm.
+# The minimum size of a frame relative to rest. No solver shrinks a body so much, but coordinates in m are 1/1000 of those in mm.
 SMALLEST = 1 / 50
-# Maximum distance [mm] between corners of an STL file that count as one vertex: three times the spacing of float32 at 500 mm.
+# The maximum distance [mm] between corners of an STL file that are the same vertex: three times the spacing of float32 at 500 mm.
 SAME_POINT = 1e-4
-# Maximum distance of a time from the time of its frame, in frames: above rounding to four digits, and far below half a frame.
+# The maximum difference between a time and the time of its frame, in frames: more than rounding to four digits, far less than 0.5.
 ON_FRAME = 1e-3
 
 _INDICES = (".pvd", ".xdmf")
@@ -44,10 +45,10 @@ ABOUT = "candidate.toml"
 
 
 class RecordedSettings(Record):
-    """Location of the sequence, and its unit of length.
+    """The location of the sequence and its unit of length.
 
-    ``folder``: a folder with one mesh file for each frame, numbered by the last digits of its name; a .pvd or .xdmf file, or a
-    folder that contains one; or the folder of a stored run.
+    ``folder``: a folder with a mesh file for each frame, whose frame number is the last number in the file name; a .pvd or .xdmf
+    file, or a folder that contains such a file; or the folder of a stored run.
     """
 
     folder: str
@@ -55,9 +56,12 @@ class RecordedSettings(Record):
 
 
 class About(Record):
-    """The contents of ``candidate.toml``: who computed the sequence, its unit of length, the time [s] to solve one frame, the
-    number of threads, and the parts of the scene ``left_out``, in words. For standings: the ``group`` of the method, the ``case``,
-    the key ``scene`` that the export states, and the ``sha256`` of each file by name, which is checked.
+    """The contents of ``candidate.toml``.
+
+    ``name``, ``version``: the program that computed the sequence. ``unit``: the unit of length. ``seconds_per_frame``: the time to
+    solve one frame. ``threads``: the number of threads. ``left_out``: the parts of the scene that the program does not model, in
+    words. The other keys are for standings. ``group``: the group of the method. ``case``: the case. ``scene``: the key of the
+    scene, which the export states. ``sha256``: the hash of each file by name, which is checked.
     """
 
     name: FileName | None = None
@@ -73,7 +77,7 @@ class About(Record):
 
     @property
     def lacks(self) -> str:
-        """The end of a sentence that lists the omitted parts; empty if there are none."""
+        """The end of a sentence, with a list of the parts that are left out; empty if there are none."""
         return f"; left out: {', '.join(self.left_out)}" if self.left_out else ""
 
     @field_validator("unit")
@@ -84,14 +88,16 @@ class About(Record):
 
 
 def about(path: Path) -> About:
-    """The ``candidate.toml`` of the sequence at ``path``, a folder or an index file; an empty record without one."""
+    """The ``candidate.toml`` of the sequence at ``path``, a folder or an index file; an empty record if the file does not exist."""
     file = _about_file(path)
     return parse(About, texts.toml(file), str(file)) if os.path.lexists(file) else About()
 
 
 def choice(path: Path, unit: str | None = None, place: str = "folder") -> Candidate:
-    """The recorded frames in the folder or file at ``path`` as a candidate. Its name and, if no ``unit`` is given, its unit are
-    from the ``candidate.toml`` of the frames; ``place`` names the path in messages.
+    """A candidate whose frames are recorded in the folder or file at ``path``.
+
+    Its name, and its unit if no ``unit`` is given, are from the ``candidate.toml`` of the frames. ``place``: the name of the path
+    in messages.
     """
     if not path.exists() or not path.parts:
         raise InputError(place, f'"{path}"', "a folder of frames")
@@ -108,13 +114,13 @@ def _about_file(path: Path) -> Path:
 
 
 def origin(settings: RecordedSettings) -> dict[str, Any]:
-    """The origin of a run, as its ``candidate.toml`` states it."""
+    """The provenance of a run: name and version of the program, as stated in ``candidate.toml``."""
     said = about(Path(settings.folder)).model_dump(exclude_none=True, include={"name", "version"})
     return {"candidate": said} if said else {}
 
 
 def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
-    """Pass every requested frame to ``sink``, after all are read and checked; the cost is from ``candidate.toml``."""
+    """Read and check all requested frames, then pass them to ``sink``. The cost is from ``candidate.toml``."""
     folder = Path(settings.folder)
     said = checked_about(folder, settings.unit)
     frames = list(checked_frames(setup, folder, settings.unit))
@@ -126,10 +132,10 @@ def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
 
 
 def checked_frames(setup: Setup, folder: Path, unit: float) -> Iterator[Frame]:
-    """The requested frames, one after the other, of the sequence in a ``folder``, with lengths in units of ``unit`` [mm];
-    InputError at the first frame that is missing or not of this surface.
+    """Yield the requested frames of the sequence in ``folder``, whose unit of length is ``unit`` [mm].
 
-    The times in an index file are multiples of ``setup.interval`` [s], or frame numbers if the interval is None.
+    Times in an index file are multiples of ``setup.interval`` [s], or frame numbers if the interval is None. Raises InputError at
+    the first frame that is missing or does not have the surface of ``setup``.
     """
     source = _source(folder)
     sequence = _sequence(source, unit, setup.interval)
@@ -152,7 +158,10 @@ def checked_frames(setup: Setup, folder: Path, unit: float) -> Iterator[Frame]:
 
 
 def checked_about(folder: Path, unit: float | None) -> About:
-    """The ``candidate.toml`` of the sequence; InputError if its unit is not ``unit`` [mm] or a file does not match its hash."""
+    """The ``candidate.toml`` of the sequence in ``folder``.
+
+    Raises InputError if it states a unit other than ``unit`` [mm], or if a file does not have the hash that it states.
+    """
     said = about(folder)
     if said.unit is not None and unit is not None and length_unit(said.unit) != unit:
         place = f"{_about_file(folder)}: unit"
@@ -166,7 +175,7 @@ def checked_about(folder: Path, unit: float | None) -> About:
 
 
 def _source(path: Path) -> Path:
-    """The folder of mesh files, or the index file, at ``path``."""
+    """The folder with mesh files, or the index file, that ``path`` stands for."""
     if (path / "run.json").is_file():
         return path / "surface"
     if path.is_dir():
@@ -184,7 +193,7 @@ def _visible(folder: Path) -> list[Path]:
 
 
 def _sequence(source: Path, unit: float, interval: float | None) -> dict[int, Path | Surface]:
-    """The surfaces, or their files, by frame number."""
+    """The surface of each frame, or the file that contains it, by frame number."""
     entries: Iterable[tuple[int | None, str, Path | Surface]]
     if source.suffix.lower() == ".xdmf":
         steps = files.read_xdmf(source, unit)
@@ -193,7 +202,7 @@ def _sequence(source: Path, unit: float, interval: float | None) -> dict[int, Pa
         entries = ((_number(time, interval), path.name, path) for time, path in files.read_pvd(source))
     else:
         meshes = [path for path in _visible(source) if path.suffix.lower() in formats()]
-        last = {path: re.findall(r"\d+", path.stem)[-1:] for path in meshes}  # digits of their names
+        last = {path: re.findall(r"\d+", path.stem)[-1:] for path in meshes}  # the last number in each name
         entries = ((int(digits[0]), path.name, path) for path, digits in last.items() if digits)
     found: dict[int, tuple[str, Path | Surface]] = {}
     for number, name, frame in entries:
@@ -205,15 +214,15 @@ def _sequence(source: Path, unit: float, interval: float | None) -> dict[int, Pa
 
 
 def _number(time: float, interval: float | None) -> int | None:
-    """The frame number at ``time``; None if it lies between two frames."""
+    """The frame number at a ``time``; None if the time is between two frames."""
     number = time if interval is None else time / interval
     return round(number) if math.isfinite(number) and abs(number - round(number)) < ON_FRAME else None
 
 
 def _positions(surface: Surface, rest: Surface) -> Floats:
-    """The points (n, 3) [mm] of ``surface``, which must have the vertices and triangles of ``rest``.
+    """The points (n, 3) [mm] of ``surface``. Raises InputError if it does not have the vertices and triangles of ``rest``.
 
-    The vertices must be in the order of ``rest``; the triangles may be in any order, and all of them may be reversed.
+    The vertices must be in the same order as in ``rest``. The triangles may be in any order, and all of them may be reversed.
     """
     check_finite(surface)
     want = f"the vertices and triangles of {rest.place}"
@@ -228,13 +237,15 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
     orders = (_strangers(surface.triangles, triangles) for triangles in (rest.triangles, rest.triangles[:, ::-1]))
     other = min(orders, key=np.count_nonzero)
     if other.any():
-        got = f"{np.count_nonzero(other)} triangles of other vertices, the first triangle {other.argmax()}"
+        got = (
+            f"{np.count_nonzero(other)} triangles with other vertices, the first of which is triangle {other.argmax()}"
+        )
         raise InputError(surface.place, got, want)
     return surface.points
 
 
 def _strangers(triangles: Ints, rest: Ints) -> NDArray[np.bool_]:
-    """True (m,) for ``triangles`` (m, 3) that occur more often than in ``rest`` (m, 3), for any first corner."""
+    """A mask (m,) of the ``triangles`` (m, 3) that occur more often than in ``rest`` (m, 3); their first corner does not matter."""
     both = np.concatenate([_turned(triangles), _turned(rest)])
     which = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     here, there = which[: len(triangles)], which[len(triangles) :]
@@ -243,13 +254,16 @@ def _strangers(triangles: Ints, rest: Ints) -> NDArray[np.bool_]:
 
 
 def _turned(triangles: Ints) -> Ints:
-    """Each triangle written from its smallest vertex, with the same orientation."""
+    """The ``triangles`` (m, 3), each beginning with its lowest vertex index and with the same orientation."""
     corners = (triangles.argmin(axis=1)[:, None] + np.arange(3)) % 3
     return np.take_along_axis(triangles, corners, axis=1)
 
 
 def _welded(soup: Surface, rest: Surface) -> Floats:
-    """Points (n, 3) [mm] for the vertices of ``rest``, from the same triangles in the same order but without shared vertices."""
+    """The positions (n, 3) [mm] of the vertices of ``rest``, from a ``soup`` of the same triangles in the same order.
+
+    Triangles of a soup share no vertices, as in an STL file. Raises InputError if corners of the same vertex are apart.
+    """
     points, found = np.full(rest.points.shape, np.nan), []
     for vertices in (rest.triangles.ravel(), rest.triangles[:, ::-1].ravel()):
         points[vertices] = soup.points
@@ -263,7 +277,7 @@ def _welded(soup: Surface, rest: Surface) -> Floats:
 
 
 def _check_at_rest(place: str, number: int, positions: Floats, rest: Surface) -> None:
-    """Raise InputError if the first frame is far from ``rest``; warn if it is slightly off."""
+    """Raise InputError if the first frame is far from ``rest``, and log a warning if it differs slightly."""
     away = float(np.sqrt(np.mean(np.sum((positions - rest.points) ** 2, axis=1))))
     limit = NEAR_REST * diagonal(rest.points)
     got = f"a first frame ({number}) that is {away:.3g} mm (rms) from the rest surface {rest.place}"

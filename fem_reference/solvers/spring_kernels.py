@@ -1,6 +1,6 @@
-"""Masses and springs, compiled: their forces and their steps in time. Report section 5.5.1.
+"""Compiled functions for masses and springs: forces and time steps. Report section 5.5.1.
 
-Units: mm, N, s and tonne. Arrays should be writable and C-contiguous: the loops are compiled again for any other kind.
+Units are mm, N, s and tonne. Arrays should be writable and C-contiguous; for any other layout the functions are compiled again.
 """
 
 import math
@@ -13,8 +13,10 @@ from fem_reference.solvers.compiled_kernels import compiled
 
 
 class Network(NamedTuple):
-    """Point ``masses`` (n,) [tonne] and ``springs`` (e, 2) between them, of ``lengths`` (e,) [mm] at rest and one ``stiffness`` k
-    [N/mm]; a ``damping`` c [N s/mm] of every mass, and ``gravity`` (3,) [mm/s^2].
+    """Point ``masses`` (n,) [tonne], connected by ``springs`` (e, 2).
+
+    ``lengths`` (e,) [mm]: lengths of the springs at rest. ``stiffness`` k [N/mm] of each spring. ``damping`` c [N s/mm] of each
+    mass. ``gravity`` (3,) [mm/s^2].
     """
 
     masses: Floats
@@ -26,7 +28,7 @@ class Network(NamedTuple):
 
 
 class PrescribedPath(NamedTuple):
-    """The ``fixed`` masses (h,), which move at constant velocity from their positions ``before`` to those ``after`` (h, 3) [mm]."""
+    """The ``fixed`` masses (h,), which move at constant velocity from the positions ``before`` to ``after``, both (h, 3) [mm]."""
 
     fixed: Ints
     before: Floats
@@ -35,10 +37,10 @@ class PrescribedPath(NamedTuple):
 
 @compiled
 def forces(points: Floats, network: Network) -> Floats:
-    """The force (n, 3) [N] on each mass, without damping: its weight plus the forces of its springs.
+    """The force (n, 3) [N] on each mass without damping: the weight of the mass plus the forces of its springs.
 
-    A spring from mass i pulls with ``k (l - L) (x_j - x_i) / l``: F_ij of eq. 5.3 is minus this force, since eq. 5.4 has it on the
-    left. If both ends coincide the spring has no direction and does not pull.
+    A spring from mass i to mass j pulls on i with the force ``k (l - L) (x_j - x_i) / l``. F_ij in eq. 5.3 has the opposite sign,
+    because it is on the left-hand side of eq. 5.4. If both ends coincide, the spring has no direction and no force.
     """
     found = np.empty_like(points)
     for i in range(len(points)):
@@ -63,9 +65,10 @@ def forces(points: Floats, network: Network) -> Floats:
 def advance(
     points: Floats, previous: Floats, network: Network, path: PrescribedPath, time_step: float, steps: int
 ) -> None:
-    """Move ``points`` (n, 3) [mm] in place through ``steps`` of ``time_step`` [s]; ``previous`` (n, 3): positions one step before.
+    """Move ``points`` (n, 3) [mm] in place through a number of ``steps``, each of ``time_step`` [s].
 
-    Position Verlet with the velocity of the step before, eqs 5.6 and 5.7:
+    ``previous`` (n, 3) [mm]: the positions one step earlier, which are updated. The scheme is position Verlet with the velocity of
+    the previous step, eqs 5.6 and 5.7:
     ``x(t + dt) = 2 x(t) - x(t - dt) + dt^2 / m (F(t) - c (x(t) - x(t - dt)) / dt)``.
     """
     for step in range(1, steps + 1):

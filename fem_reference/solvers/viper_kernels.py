@@ -1,9 +1,10 @@
-"""Rods of position based dynamics: quaternions and the projections of constraints.
+"""Rods in position based dynamics: operations on quaternions, and projections of constraints.
 
-k rods of p points each have ``points`` (k, p, 3) and ``radii`` (k, p) [mm], and ``turns`` (k, p + 1, 4): unit quaternions
-(w, x, y, z) that rotate each segment's frame from rest; the first and last are the rotations of the two bones, which prescribe the
-end points. All constraints of a kind are projected at once (Jacobi), with steps so small that their sum with the steps of
-neighbours does not overshoot. If constraints contradict each other, the limit is the least sum of squares, for any order of points.
+There are k rods with p points each. ``points`` (k, p, 3) [mm] and ``radii`` (k, p) [mm] belong to the points. ``turns`` (k, p + 1,
+4) are unit quaternions (w, x, y, z), which rotate the frames of segments from rest; the first and the last quaternion of a rod are
+the rotations of the two bones, which prescribe its end points. All constraints of a kind are projected simultaneously (Jacobi),
+with steps small enough that the sum of neighbouring steps does not overshoot. If constraints contradict each other, sweeps converge
+to the minimum of the sum of squared errors, which does not depend on the order of the points.
 """
 
 import numpy as np
@@ -14,7 +15,7 @@ _TINY = np.finfo(float).tiny
 
 
 def product(p: Floats, q: Floats) -> Floats:
-    """Products (..., 4) of quaternions."""
+    """The products (..., 4) of quaternions ``p`` and ``q`` (..., 4)."""
     a, b, c, d = (p[..., [i]] for i in range(4))
     w, x, y, z = (q[..., [i]] for i in range(4))
     real, i = a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y
@@ -22,7 +23,7 @@ def product(p: Floats, q: Floats) -> Floats:
 
 
 def pure(vectors: Floats) -> Floats:
-    """The quaternions (..., 4) without real part of ``vectors`` (..., 3)."""
+    """The quaternions (..., 4) with the imaginary parts ``vectors`` (..., 3) and the real part 0."""
     return np.concatenate([np.zeros_like(vectors[..., :1]), vectors], axis=-1)
 
 
@@ -32,7 +33,7 @@ def conjugate(turns: Floats) -> Floats:
 
 
 def turned(turns: Floats, vectors: Floats) -> Floats:
-    """The ``vectors`` (..., 3) turned by ``turns`` (..., 4)."""
+    """The ``vectors`` (..., 3) rotated by ``turns`` (..., 4)."""
     return product(product(turns, pure(vectors)), conjugate(turns))[..., 1:]
 
 
@@ -42,16 +43,18 @@ def unit(quaternions: Floats) -> Floats:
 
 
 def matrices(turns: Floats) -> Floats:
-    """The rotations (..., 3, 3) of ``turns`` (..., 4); NaN if they are NaN."""
+    """The rotation matrices (..., 3, 3) of ``turns`` (..., 4); NaN for quaternions that are NaN."""
     return turned(turns[..., None, :], np.eye(3)).swapaxes(-1, -2)
 
 
 def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: float) -> None:
-    """Project ``C = (x_b - x_a) / l - turned(u, t)`` of each segment, which is ``l t`` at ``rest`` (k, p - 1, 3) [mm].
+    """Project ``C = (x_b - x_a) / l - turned(u, t)`` of each segment from point a to point b.
 
-    Where C is 0 there is neither stretch nor shear (Kugelstadt and Schoemer 2016): the segment has its rest length and the
-    direction of its frame. A frame has the inverse mass 1 / l^2, so nothing depends on the unit of length: the sum of inverse
-    masses times squared slopes is (1 + 1 + 4) / l^2, and another 2 / l^2 bounds the effect of neighbours.
+    ``rest`` (k, p - 1, 3) [mm]: the vectors ``l t`` of the segments at rest, with the length l and the unit vector t; u is the
+    quaternion of the segment. If C is 0 there is neither stretch nor shear (Kugelstadt and Schoemer 2016): the segment has its rest
+    length and the direction of its frame. The inverse mass of a frame is 1 / l^2, so that the result does not depend on the unit of
+    length: the sum of inverse masses times squared gradients is (1 + 1 + 4) / l^2. The step is made smaller as if the sum were
+    2 / l^2 larger, which bounds the effect of neighbouring segments.
     """
     lengths = np.linalg.norm(rest, axis=2, keepdims=True)
     tangents, u = rest / lengths, turns[:, 1:-1]
@@ -62,9 +65,10 @@ def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: floa
 
 
 def project_bend(turns: Floats, stiffness: float) -> None:
-    """Project ``C = Im(conjugate(u_a) u_b)``, bend and twist, of neighbouring segments and of the outer segments and bones.
+    """Project bend and twist ``C = Im(conjugate(u_a) u_b)`` between neighbouring segments, and between outer segments and bones.
 
-    C is the Darboux vector of Kugelstadt and Schoemer (2016) if frames at rest are parallel: rods curved at rest remain so.
+    C is the Darboux vector of Kugelstadt and Schoemer (2016) if all frames of a rod are chosen parallel at rest. With this choice C
+    is 0 at rest for a curved rod too.
     """
     a, b, found = turns[:, :-1], turns[:, 1:], np.zeros_like(turns)
     step = pure(-stiffness / 4 * product(conjugate(a), b)[..., 1:])
@@ -75,15 +79,16 @@ def project_bend(turns: Floats, stiffness: float) -> None:
 
 
 def volumes(points: Floats, radii: Floats) -> Floats:
-    """Volumes (k, p - 1) [mm3] of segments as truncated cones, ``pi / 3 l (r_a^2 + r_a r_b + r_b^2)``."""
+    """The volumes (k, p - 1) [mm3] of segments, which are truncated cones: ``pi / 3 l (r_a^2 + r_a r_b + r_b^2)``."""
     a, b = radii[:, :-1], radii[:, 1:]
     return np.asarray(np.pi / 3 * np.linalg.norm(np.diff(points, axis=1), axis=2) * (a * a + a * b + b * b))
 
 
 def project_volume(points: Floats, radii: Floats, rest: Floats, stiffness: float) -> None:
-    """Project ``C = V / V_0 - 1`` of each segment by changing ``points`` and ``radii``; ``rest`` V_0 (k, p - 1) [mm3].
+    """Project ``C = V / V_0 - 1`` of each segment by changing ``points`` and ``radii``, with ``rest`` V_0 (k, p - 1) [mm3].
 
-    Each point and radius changes by the mean of the steps of its two segments; a radius at an end has one segment.
+    Each point and each radius changes by the mean of the steps of the two adjacent segments; a radius at an end of a rod changes by
+    the step of its single segment.
     """
     steps, a, b = np.diff(points, axis=1), radii[:, :-1], radii[:, 1:]
     lengths, ratio = np.linalg.norm(steps, axis=2), volumes(points, radii) / rest

@@ -1,14 +1,14 @@
-"""Extended position based dynamics of the muscle surface: constraints with compliances, and time, in physical units.
+"""Extended position based dynamics (XPBD) of the muscle surface, with compliances and time in physical units.
 
-Macklin, Mueller and Chentanez 2016, "XPBD: position-based simulation of compliant constrained dynamics",
-DOI 10.1145/2994258.2994272; report section 5.5.3 mentions it. The surface is a membrane with mass around an interior that
-resists change of volume. Position based dynamics, with the same constraints, gets stiffer with every sweep and every step.
-Here, a muscle is too soft after too few sweeps; enough sweeps give an implicit Euler step, and the equilibrium depends on the time
-step only if directions change within a step. All this holds if the sweeps resolve a step: if ``sqrt(k / m) dt`` of the stiffest
-edges is below about 1, or with more sweeps. In the settings for Table 5.1 this number is 3 (1.1 for half of the edges) with one
-sweep: doubling the sub-steps changes positions of hip_flexion by up to 1.6 mm, 0.7 mm on average, in a displacement of 53 mm.
+Macklin, Mueller and Chentanez 2016, "XPBD: position-based simulation of compliant constrained dynamics", DOI
+10.1145/2994258.2994272; the method is mentioned in report section 5.5.3. The surface is a membrane with mass, and its interior
+resists changes of volume. In position based dynamics, which has the same constraints, each additional sweep or step increases the
+stiffness. In XPBD, too few sweeps make the muscle too soft, and enough sweeps give an implicit Euler step. The equilibrium depends
+on the time step only if directions change within a step. This holds if the sweeps resolve a step, which needs ``sqrt(k / m) dt`` of
+the stiffest edges below about 1, or more sweeps. With the settings for Table 5.1, which use one sweep, this value is 3 (1.1 for
+half of the edges): doubling the sub-steps changes positions of hip_flexion by up to 1.6 mm (mean 0.7 mm; displacement 53 mm).
 
-Frame number n is the state after iteration n, ``frame_time`` after the previous frame; in between bones move at constant velocity.
+Frame number n is the state after iteration n, ``frame_time`` after the previous frame. Bones move at constant velocity in between.
 """
 
 import math
@@ -32,8 +32,10 @@ from fem_reference.solvers.pbd_kernels import dihedrals, distances, pull_dihedra
 
 
 class XpbdCollision(Record):
-    """Contact of bones with free vertices. ``gap`` [mm]: the distance of a vertex at which contact begins, or its distance at rest
-    if that is less; ``stiffness`` [MPa/mm]: under a pressure p the surface comes nearer by p / stiffness.
+    """Contact of bones with free vertices.
+
+    ``gap`` [mm]: the distance between a vertex and a bone at which contact begins; for a vertex that is closer at rest, contact
+    begins at its distance at rest. ``stiffness`` [MPa/mm]: under a pressure p the surface comes closer by p / stiffness.
     """
 
     gap: Annotated[units.Length, Field(ge=0)]
@@ -41,14 +43,15 @@ class XpbdCollision(Record):
 
 
 class XpbdSettings(Record):
-    """Settings of the method and of the muscle; every key is required except the keys that add an effect.
+    """Settings of the method and of the muscle. The first four keys are required; each of the other keys adds an effect.
 
-    ``frame_time`` [s]: the solver's time between successive frame numbers, in place of the scene's interval. ``sub_steps``: the
-    number of time steps in a ``frame_time``. ``sweeps``: the number of sweeps over all constraints in each time step.
-    ``density`` [t/mm3] of the enclosed body; its mass is divided among the vertices in proportion to area.
+    ``frame_time`` [s]: the time between two frame numbers in this solver, which replaces the interval of the scene. ``sub_steps``:
+    the number of time steps in a ``frame_time``. ``sweeps``: the number of sweeps over all constraints in each time step.
+    ``density`` [t/mm3]: the density of the enclosed body, whose mass is divided among the vertices in proportion to their areas.
 
-    ``stretch`` [N/mm]: Young's modulus times thickness of a membrane. ``bending`` [N mm]: stiffness of a plate. ``volume`` [MPa]:
-    bulk modulus of the enclosed body. ``damping`` [1/s]: rate of decay of velocities. ``collision``: contact with bones.
+    ``stretch`` [N/mm]: Young's modulus times thickness, of a membrane. ``bending`` [N mm]: the bending stiffness of a plate.
+    ``volume`` [MPa]: the bulk modulus of the enclosed body. ``damping`` [1/s]: the rate at which velocities decay. ``collision``:
+    contact with bones.
     """
 
     frame_time: units.Time
@@ -64,11 +67,12 @@ class XpbdSettings(Record):
 
 @dataclass(frozen=True, eq=False)
 class XpbdConstraints:
-    """Soft constraints towards a body's rest state: any graph of edges, closed triangles, and hinges; each kind may be absent.
+    """Compliant constraints that pull a body towards its rest state: edges, an enclosed volume, hinges. Each kind may be absent.
 
-    ``inverse_masses`` (n,) [1/t], 0 for attached points; ``edges`` (e, 2) of ``lengths`` (e,) [mm] and compliances
-    ``edge_softness`` (e,) [mm/N]; ``triangles`` (m, 3) around ``six_volumes`` [mm3], ``volume_softness`` [mm5/N]; ``hinges`` (h,
-    4) of ``angles`` (h,) [rad] and ``hinge_softness`` (h,) [1/(N mm)].
+    ``inverse_masses`` (n,) [1/t]: 0 for attached points. ``edges`` (e, 2), in any graph, with their ``lengths`` at rest (e,) [mm]
+    and compliances ``edge_softness`` (e,) [mm/N]. ``triangles`` (m, 3), which form a closed surface, with six times the volume
+    inside at rest, ``six_volumes`` [mm3], and its compliance ``volume_softness`` [mm5/N]. ``hinges`` (h, 4) with their ``angles``
+    at rest (h,) [rad] and compliances ``hinge_softness`` (h,) [1/(N mm)].
     """
 
     inverse_masses: Floats
@@ -84,16 +88,17 @@ class XpbdConstraints:
 
     @classmethod
     def at_rest(cls, surface: Surface, attached: Ints, settings: XpbdSettings) -> "XpbdConstraints":
-        """Constraints of a closed ``surface`` with ``attached`` vertices (k,); a kind without stiffness is absent.
+        """The constraints of a closed ``surface`` with ``attached`` vertices (k,); a kind without stiffness is absent.
 
-        An edge of length l whose two triangles have the total area a has the stiffness ``stretch a / l^2``, and its hinge
-        ``bending l^2 / a``. In a net of equal triangles they form a membrane of Young's modulus times thickness ``stretch`` and
-        Poisson's ratio 1/3, and a plate of stiffness ``bending`` (Seung and Nelson 1988, DOI 10.1103/PhysRevA.38.1005).
+        An edge of length l has the stiffness ``stretch a / l^2``, where a is the total area of its two triangles; its hinge has the
+        stiffness ``bending l^2 / a``. In a regular mesh of equal triangles these form a membrane whose Young's modulus times
+        thickness is ``stretch``, with Poisson's ratio 1/3, and a plate of bending stiffness ``bending`` (Seung and Nelson 1988,
+        DOI 10.1103/PhysRevA.38.1005).
         """
         # Compiled functions need writable arrays.
         points, triangles = np.array(surface.points), np.array(surface.triangles)
         hinges, six_volumes = hinges_of(triangles), volume(points, triangles)[0]
-        areas = sum(triangle_areas(points, hinges[:, corners]) for corners in ([0, 1, 2], [0, 1, 3]))  # of both
+        areas = sum(triangle_areas(points, hinges[:, corners]) for corners in ([0, 1, 2], [0, 1, 3]))  # both triangles
         slender = distances(points, hinges) ** 2 / areas
         stiffnesses = settings.stretch, settings.bending, settings.volume
         stretched, bent, filled = (slice(None if stiffness else 0) for stiffness in stiffnesses)
@@ -113,7 +118,11 @@ class XpbdConstraints:
 
 @dataclass(frozen=True)
 class XpbdStep:
-    """A time step: ``seconds`` long, ``sweeps`` over all constraints, ``damping`` [1/s], external ``acceleration`` [mm/s2]."""
+    """The parameters of a time step.
+
+    ``seconds``: its duration. ``sweeps``: the number of sweeps over all constraints. ``damping`` [1/s]. ``acceleration`` [mm/s2]:
+    the external acceleration.
+    """
 
     seconds: float
     sweeps: int
@@ -122,7 +131,10 @@ class XpbdStep:
 
 
 def inverse_masses(surface: Surface, attached: Ints, density: float) -> Floats:
-    """Inverse masses (n,) [1/t] of vertices, which share the mass of the body in proportion to area; 0 if attached."""
+    """The inverse masses (n,) [1/t] of the vertices, 0 for ``attached`` vertices.
+
+    The mass of the body is divided among all vertices in proportion to their areas.
+    """
     areas = vertex_areas(surface.points, surface.triangles)
     mass = density * enclosed_volume(surface.points, surface.triangles) * areas / areas.sum()
     found = 1 / mass
@@ -131,14 +143,17 @@ def inverse_masses(surface: Surface, attached: Ints, density: float) -> Floats:
 
 
 class BoneContact:
-    """A ``bone``, its contact softness at each vertex, (n,) [mm/N], and the multipliers (n,) of the present time step."""
+    """Contact with a ``bone``: the compliance ``softness`` (n,) [mm/N] at vertices, and the multipliers (n,) of the time step."""
 
     def __init__(self, bone: CollidingBone, softness: Floats) -> None:
         self.bone, self.softness = bone, softness
         self.multipliers = np.zeros(len(softness))
 
     def project(self, points: Floats, inverse_masses: Floats, seconds: float) -> Floats:
-        """The displacements (n, 3) [mm] of one projection: contact never pulls, so no multiplier is below 0."""
+        """The displacements (n, 3) [mm] due to one projection. Contact never pulls: no multiplier becomes negative.
+
+        ``seconds``: the duration of the time step.
+        """
         vertices, value, away = self.bone.near(points)
         soft, before, mass = self.softness[vertices] / seconds**2, self.multipliers[vertices], inverse_masses[vertices]
         after = np.maximum(before - (value + soft * before) / (mass + soft), 0)
@@ -156,7 +171,7 @@ def advance(
     step: XpbdStep,
     contacts: Sequence[BoneContact] = (),
 ) -> tuple[Floats, Floats]:
-    """Positions (n, 3) [mm] and velocities (n, 3) [mm/s] after one time step, Algorithm 1 of the paper."""
+    """Positions (n, 3) [mm] and velocities (n, 3) [mm/s] after one time step, by Algorithm 1 of the paper."""
     at, dt = constraints, step.seconds
     loose = (at.inverse_masses > 0)[:, None]
     velocities = math.exp(-step.damping * dt) * velocities + np.where(loose, dt * np.array(step.acceleration), 0.0)
@@ -174,13 +189,13 @@ def advance(
 
 
 def solve(setup: Setup, settings: XpbdSettings, sink: Sink) -> Outcome:
-    """Iterate from rest at the first of ``setup.frames`` to the last of them; each requested frame goes into ``sink``."""
+    """Iterate from rest at the first of ``setup.frames`` to the last; each requested frame goes to ``sink``."""
     outcome = follow(timed(XpbdSurface, setup, settings), setup, sink, settings.sub_steps)
     return replace(outcome, message=outcome.message + other_clock(setup, settings.frame_time))
 
 
 class XpbdSurface(MovingSurface):
-    """A surface with its constraints, the ``velocities`` (n, 3) [mm/s] of its vertices, and bones in contact with it."""
+    """A surface with its constraints, the ``velocities`` (n, 3) [mm/s] of its vertices, and its ``contacts`` with bones."""
 
     def __init__(self, setup: Setup, settings: XpbdSettings) -> None:
         super().__init__(setup)
@@ -195,7 +210,7 @@ class XpbdSurface(MovingSurface):
         self.cost["projections"] = 0.0
 
     def move(self, number: int) -> None:
-        """Run one iteration, of ``sub_steps`` time steps."""
+        """Run one iteration, which consists of ``sub_steps`` time steps, up to frame ``number``."""
         now, chosen = (self.points, self.velocities), self.settings
         for step in range(1, chosen.sub_steps + 1):
             frame = number - 1 + step / chosen.sub_steps

@@ -142,13 +142,14 @@ def test_cost() -> None:
 def test_an_end_inside_an_obstacle_is_refused_at_rest_and_an_outcome_later() -> None:
     inside = {"centre": "5, 5, 28 mm", "radius": "4 mm"}
     with pytest.raises(
-        InputError, match=r"obstacle\[0\]: got a fixed point of line 0 2 mm inside, want an obstacle with all"
+        InputError,
+        match=r"obstacle\[0\]: got a fixed point 2 mm inside the obstacle \(line 0\), want an obstacle with all",
     ):
         solved(bar(), obstacle=[{"bone": "bottom", "sphere": inside}])
     down = RigidMotion((0, 0, -1), None, (0.0, 10.0), (0.0, 20.0))
     outcome, frames = solved(bar(down), obstacle=[{"bone": "bottom", "sphere": inside | {"centre": "5, 5, 12 mm"}}])
     assert outcome.status == "diverged"
-    assert outcome.message == "frame 10: a fixed point of line 0 2 mm inside; a smaller radius may help"
+    assert outcome.message == "frame 10: a fixed point 2 mm inside the obstacle (line 0); a smaller radius may help"
     assert [frame.number for frame in frames] == [0, 5]
 
 

@@ -176,9 +176,9 @@ def _not_a_number() -> tuple[Floats, np.ndarray]:
     [
         (_lost_vertex, "43 vertices instead of 42"),
         (_lost_triangle, "79 triangles instead of 80"),
-        (_other_vertices, r"\d+ triangles of other vertices, the first triangle \d+"),
-        (_repeated_triangle, "2 triangles of other vertices, the first triangle 3"),
-        (_two_flipped, "2 triangles of other vertices, the first triangle 7"),
+        (_other_vertices, r"\d+ triangles with other vertices, the first of which is triangle \d+"),
+        (_repeated_triangle, "2 triangles with other vertices, the first of which is triangle 3"),
+        (_two_flipped, "2 triangles with other vertices, the first of which is triangle 7"),
         (_not_a_number, r"a point that is not finite \(vertex 5\)"),
     ],
     ids=lambda value: getattr(value, "__name__", ""),

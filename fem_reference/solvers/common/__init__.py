@@ -1,1 +1,1 @@
-"""Code shared by solvers: the solver protocol, the loop over frames, load steps, checks of states."""
+"""Code that several solvers share: the solver protocol, the loop over frames, load steps, and checks of states."""

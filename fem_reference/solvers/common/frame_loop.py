@@ -1,4 +1,4 @@
-"""The loop over frame numbers of the fast solvers, and surfaces attached to moving bones."""
+"""The loop over frame numbers in fast solvers, and surfaces that are attached to moving bones."""
 
 import math
 import time
@@ -19,32 +19,37 @@ from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.muscle import MOST_FRAMES
 from fem_reference.solvers.common.state_checks import SurfaceCheck, Trouble
 
-# The maximum number of samples of a motion per frame; they show whether a bone turns too far from one sample to the next.
+# The maximum number of samples of a motion per frame number, between which a bone must not rotate or move too far.
 _PARTS = 16
 
 
 class FrameModel(Protocol):
-    """A model of a muscle, advanced by frame numbers; the loop adds to its ``cost``. ``advice`` ends messages of failed runs."""
+    """A model of a muscle that is advanced from one frame number to the next.
+
+    ``cost``: the cost of the run, to which the loop adds. ``advice``: the last part of the message of a failed run.
+    """
 
     cost: dict[str, float]
     advice: str
 
     def move(self, number: int, /) -> None:
-        """Advance to the frame ``number``; the time of this call counts as solving."""
+        """Advance to frame ``number``. The time of this call is the time to solve."""
 
     def trouble(self) -> Trouble | None:
-        """The trouble with the present state; None if there is none."""
+        """The trouble with the present state, which ends the run; None if there is none."""
 
     def frame(self, number: int, /) -> Frame:
-        """The present state, at the frame ``number``."""
+        """The present state, which is that of frame ``number``."""
 
     def ending(self) -> Outcome:
-        """The outcome of a run that reached every frame."""
+        """The outcome of a run that reached all frames."""
 
 
 def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> Outcome:
-    """Advance a ``model`` from rest at the first frame of ``setup`` through every frame number to the last, each in ``per_frame``
-    parts; bones take their poses at the end of each part. ``sink`` gets the frames. *Out of steps* if bones move too far in a part.
+    """Advance a ``model`` from rest at the first frame of ``setup`` through every frame number; requested frames go to ``sink``.
+
+    ``per_frame``: the number of parts into which the model divides a frame number; bones move to their pose at the end of each
+    part. The status is *out of steps* if a bone moves too far in one part. Raises InputError if there are too many frame numbers.
     """
     frames = setup.frames
     if frames[-1] - frames[0] > MOST_FRAMES:
@@ -57,12 +62,12 @@ def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> O
 
 
 def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
-    """Trouble with a bone that moves too far, or out and back, between two samples of its pose; None without trouble."""
+    """The trouble if a bone moves too far, or out and back, between two samples of its pose; None if no bone does."""
     if all(bone.motion is None for bone in setup.bones):
         return None
     points, count = setup.surface.points, (setup.frames[-1] - setup.frames[0]) * per_frame
     seen = np.linspace(setup.frames[0], setup.frames[-1], count + 1)
-    # The loop reports bones whose poses are not finite.
+    # Bones whose poses are not finite are omitted here; they are reported in the loop.
     bones = [bone for bone in setup.bones if np.isfinite([bone.pose(frame) for frame in seen]).all()]
     things = [posed(f'bone "{bone.name}"', bone.pose, points) for bone in bones]
     found = skipped(things, seen.tolist(), diagonal(points))
@@ -77,13 +82,13 @@ def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
 
 
 def refused(model: FrameModel, first: int, sink: Sink, why: Trouble) -> Outcome:
-    """The outcome of a loop that does not start, with the reason ``why``; ``sink`` gets the ``first`` frame, at rest."""
+    """The outcome of a run that ends before the loop, for the reason ``why``. The ``first`` frame, at rest, goes to ``sink``."""
     sink(model.frame(first))
     return Outcome(why.status, why.sentence, _begun(model))
 
 
 def each(model: FrameModel, numbers: Iterable[int], wanted: tuple[int, ...], sink: Sink) -> Outcome:
-    """Advance ``model`` through the frame ``numbers``; ``sink`` gets the ``wanted`` frames."""
+    """Advance ``model`` through the frame ``numbers``, up to the first trouble. The ``wanted`` frames go to ``sink``."""
     cost = _begun(model)
     for number in numbers:
         begin = time.perf_counter()
@@ -108,8 +113,10 @@ def _begun(model: FrameModel) -> dict[str, float]:
 def timed[M: FrameModel, S: Record](
     make: Callable[[Any, S], M], setup: Setup, settings: S, quick: S | None = None
 ) -> M:
-    """The model that ``make`` builds from ``setup`` and ``settings``, with ``seconds_setup`` in its cost. Before that, one frame of
-    a tetrahedron is solved, with ``quick`` settings if given, to compile every function; this takes ``seconds_compile``.
+    """The model that ``make`` creates from ``setup`` and ``settings``, with two times in its cost.
+
+    ``seconds_compile``: the time to solve one frame of a tetrahedron beforehand, which compiles all functions; it uses the settings
+    ``quick`` if they are given. ``seconds_setup``: the time to create the model.
     """
     begin = time.perf_counter()
     first = make(tetrahedron(), quick or settings)
@@ -123,7 +130,7 @@ def timed[M: FrameModel, S: Record](
 
 
 def tetrahedron() -> MuscleProblem:
-    """A tetrahedron with a fibre, attached at a vertex to a bone."""
+    """A problem of one tetrahedron, with one fibre and one vertex that is attached to a bone."""
     corners = np.vstack([np.zeros(3), np.eye(3)])
     surface, facets = Surface(corners, TET_FACES), {"end": TET_FACES[:1]}
     clear = Grid(np.ones((5, 5, 5)), (-1.0, -1.0, -1.0), 1.0, 1.0, 0.0, 0.0)
@@ -134,7 +141,7 @@ def tetrahedron() -> MuscleProblem:
 
 
 class MovingSurface:
-    """The surface of a muscle that moves from each frame number to the next, with its vertices at ``points`` (n, 3) [mm]."""
+    """A muscle surface with vertices at ``points`` (n, 3) [mm], which is advanced from one frame number to the next."""
 
     advice = "a slower motion, more steps or a lower stiffness may help"
 
@@ -149,22 +156,22 @@ class MovingSurface:
         return self.check.trouble(self.points)
 
     def frame(self, number: int) -> Frame:
-        """The present surface."""
+        """The present surface, which is that of frame ``number``."""
         return Frame(number, self.points.copy())
 
     def ending(self) -> Outcome:
-        """Converged, as no iteration fails."""
+        """The outcome, always *converged*, because an iteration cannot fail."""
         return Outcome("converged", f"{self.setup.frames[-1] - self.setup.frames[0]} iterations")
 
 
 def carry(points: Floats, setup: Setup, frame: float) -> None:
-    """Move the attached vertices with their bones to ``frame``."""
+    """Move the attached vertices, in place, with their bones to ``frame``."""
     for entry in setup.attached:
         points[entry.vertices] = apply(entry.bone.pose(frame), setup.surface.points[entry.vertices])
 
 
 def other_clock(setup: Setup, frame_time: float) -> str:
-    """A note if the interval [s] of the scene differs from a solver's ``frame_time`` [s]; empty otherwise."""
+    """The end of a message if the interval of the scene differs from the ``frame_time`` [s] of a solver; otherwise empty."""
     if setup.interval is None or math.isclose(setup.interval, frame_time):
         return ""
-    return f"; its interval between frame numbers is {frame_time:g} s, and the interval of the scene is {setup.interval:g} s"
+    return f"; a frame number lasts {frame_time:g} s in this solver, but {setup.interval:g} s in the scene"

@@ -1,9 +1,10 @@
 """A Hill-type muscle: a contractile and a parallel element at a pennation angle, in series with a tendon (report 5.1, Figure 5.1).
 
-Forces are relative to the maximum isometric force F0, fibre lengths to the optimal length l0; velocities of shortening are positive
-(eq. 5.1). The curves are those of Thelen (2003, doi 10.1115/1.1531112), with constants as in OpenSim's ``Thelen2003Muscle``;
-the structure is Zajac's (1989), and the hyperbola (eq. 5.1) is Hill's. Its constants follow from a / F0 and the maximum shortening
-velocity vmax: ``b = a / F0 vmax``. Unlike in Thelen's model, vmax does not depend on the activation.
+Forces are divided by the maximum isometric force F0 and fibre lengths by the optimal length l0. Velocities are positive in
+shortening (eq. 5.1). The curves are those of Thelen (2003, doi 10.1115/1.1531112), with the constants of OpenSim's
+``Thelen2003Muscle``; the structure is that of Zajac (1989), and the hyperbola (eq. 5.1) is that of Hill. The constants of the
+hyperbola follow from a / F0 and the maximum shortening velocity vmax: ``b = a / F0 vmax``. Unlike in Thelen's model, vmax does not
+depend on the activation.
 """
 
 import math
@@ -19,25 +20,25 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Angle, Force, PositiveLength
 
-# Thelen 2003, young adults: the width of the active curve; the shape of the passive curve and its strain at F0; the strain of the
-# tendon at F0; the maximum force in lengthening.
+# Constants of Thelen 2003 for young adults: the width of the active curve, the shape of the passive curve, its strain at F0, the
+# strain of the tendon at F0, and the maximum force [F0] in lengthening.
 _WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN, _LENGTHENING = 0.45, 5.0, 0.6, 0.04, 1.4
-# The toe of the tendon's curve ends at this fraction of F0 and has this shape; from there the curve continues as its tangent.
+# The toe of the tendon's curve ends at the fraction _TOE of F0 and has the shape _TOE_SHAPE; beyond the toe the curve is a tangent.
 _TOE, _TOE_SHAPE = 0.33, 3.0
 _TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # at the end, times the strain there
 _TOE_STRAIN = _TENDON_STRAIN * _TOE_SLOPE / (_TOE_SLOPE + 1 - _TOE)
-# Equilibrium fibre lengths [l0] are sought between the first two, in steps of at most the third.
+# Fibre lengths [l0] in equilibrium are searched between _SHORTEST and _LONGEST in steps of about _STEP.
 _SHORTEST, _LONGEST, _STEP = 0.1, 3.0, 0.0075
-_SLACK = 1e-9  # a tendon with less strain than this, which may be rounding, is slack
-_LEAST = 1e-3  # a lower activation counts as this one where a velocity is computed from a force
+_SLACK = 1e-9  # a tendon whose strain is below this, which may be rounding, is slack
+_LEAST = 1e-3  # the lower bound of the activation when a velocity is computed from a force
 
 
 class Hill(Record):
     """A muscle and its tendon.
 
-    ``max_force``: F0, isometric [N]; ``optimal_length``: l0 of the fibres [mm]; ``slack_length``: of the tendon [mm];
-    ``pennation``: the angle of fibres at their optimal length [rad]; ``max_velocity``: of shortening without load [l0 / s];
-    ``curvature``: a / F0 of eq. 5.1.
+    ``max_force`` [N]: the maximum isometric force F0. ``optimal_length`` [mm]: the optimal fibre length l0. ``slack_length`` [mm]:
+    the slack length of the tendon. ``pennation`` [rad]: the angle of fibres of optimal length. ``max_velocity`` [l0 / s]: the
+    velocity of shortening without load. ``curvature``: a / F0 of eq. 5.1.
     """
 
     max_force: Force
@@ -49,7 +50,7 @@ class Hill(Record):
 
     @property
     def thickness(self) -> float:
-        """The constant distance [l0] between the two layers that the fibres connect."""
+        """The distance [l0] between the two layers that the fibres connect, which is constant."""
         return math.sin(self.pennation)
 
     def cosine(self, fibre: float) -> float:
@@ -57,17 +58,19 @@ class Hill(Record):
         return math.sqrt(max(1 - (self.thickness / fibre) ** 2, 0.0))
 
     def tendon_force(self, path: float, fibre: float) -> float:
-        """The tendon force [F0], given the length of the ``path`` [mm] from origin to insertion and the ``fibre`` length [l0]."""
+        """The tendon force [F0] for the length of the ``path`` [mm] from origin to insertion and a ``fibre`` length [l0]."""
         along = self.optimal_length * fibre * self.cosine(fibre)
         return tendon((path - along) / self.slack_length - 1)
 
     def imbalance(self, path: float, fibre: float, activation: float) -> float:
-        """The component [F0] along the tendon of the fibres' force at zero velocity, minus the force of the tendon."""
+        """The component of the fibre force along the tendon at zero velocity, minus the tendon force [F0]."""
         return (activation * active(fibre) + passive(fibre)) * self.cosine(fibre) - self.tendon_force(path, fibre)
 
     def static(self, path: float, activation: float) -> tuple[float, float]:
-        """The force [N] and the fibre length [l0] in static equilibrium (zero velocity); of several equilibria, the one with the
-        shortest fibre. A slack tendon has no force. InputError if fibres would have less than 0.1 or more than 3 l0.
+        """The force [N] and the fibre length [l0] in static equilibrium, that is, at zero velocity.
+
+        If there are several equilibria, this is the one with the shortest fibre. A slack tendon has no force. Raises InputError if
+        fibres would be shorter than 0.1 l0 or longer than 3 l0.
         """
         low = max(_SHORTEST, 1.0001 * self.thickness)
         if self.tendon_force(path, low) == 0:
@@ -85,12 +88,12 @@ class Hill(Record):
         return self.max_force * self.tendon_force(path, fibre), fibre
 
     def _fibre(self, path: float, strain: float) -> float:
-        """The fibre length [l0] at a ``strain`` of the tendon."""
+        """The fibre length [l0] at which the tendon has a given ``strain``."""
         along = (path - self.slack_length * (1 + strain)) / self.optimal_length
         return math.hypot(max(along, 0.0), self.thickness)
 
     def velocity(self, path: float, fibre: float, activation: float) -> float:
-        """The velocity of shortening [l0 / s] of fibres whose force is in equilibrium with the tendon's."""
+        """The velocity of shortening [l0 / s] at which the fibres are in equilibrium with the tendon."""
         cosine = max(self.cosine(fibre), 1e-6)
         force = (self.tendon_force(path, fibre) / cosine - passive(fibre)) / (max(activation, _LEAST) * active(fibre))
         return self.max_velocity * inverse_hyperbola(force, self.curvature)
@@ -98,8 +101,9 @@ class Hill(Record):
     def follow(
         self, times: Floats, paths: Floats, activations: Floats, tolerance: float = 1e-9
     ) -> tuple[Floats, Floats]:
-        """Forces (n,) [N] and fibre lengths (n,) [l0] at ``times`` (n,) [s], from equilibrium at the first; ``paths`` (n,) [mm] and
-        ``activations`` (n,) are linear in between.
+        """The forces (n,) [N] and fibre lengths (n,) [l0] at ``times`` (n,) [s], starting from static equilibrium.
+
+        ``paths`` (n,) [mm] and ``activations`` (n,): values at these times, between which they are interpolated linearly.
         """
         _, first = self.static(float(paths[0]), float(activations[0]))
 
@@ -118,9 +122,11 @@ class Hill(Record):
 
 
 class HillSettings(Record):
-    """Settings for lines that are modelled as equal Hill-type muscles with tendons, in equilibrium at each frame (section 5.1).
-    ``max_force``: the total of all lines. ``fibre_share``: the optimal fibre length of a line divided by its length at the first
-    frame, at which its tendon is just slack. ``pennation``: the angle between fibres and tendon. ``activation``: from 0 to 1.
+    """Settings of lines that are equally strong Hill-type muscles with tendons, in equilibrium at each frame (section 5.1).
+
+    ``max_force``: the sum of the maximum isometric forces of all lines. ``fibre_share``: the optimal fibre length of a line divided
+    by the length of the line at the first frame, where the tendon is just slack. ``pennation``: the angle between fibres and tendon
+    at the optimal fibre length. ``activation``: the activation, from 0 to 1.
     """
 
     max_force: Force
@@ -129,7 +135,7 @@ class HillSettings(Record):
     activation: Annotated[float, Field(ge=0, le=1)] = 1.0
 
     def muscles(self, lengths: Floats) -> tuple[Hill, ...]:
-        """One muscle per line, given the ``lengths`` (k,) [mm] of the lines at the first frame."""
+        """The muscle of each line, for lines with ``lengths`` (k,) [mm] at the first frame."""
         share, angle = self.fibre_share, self.pennation
         return tuple(
             Hill.model_construct(
@@ -143,17 +149,17 @@ class HillSettings(Record):
 
 
 def active(fibre: float) -> float:
-    """The contractile force [F0] at full activation and a ``fibre`` length [l0]: 1 at the optimal length."""
+    """The force [F0] of the contractile element at full activation and a ``fibre`` length [l0]; 1 at the optimal length."""
     return math.exp(-((fibre - 1) ** 2) / _WIDTH)
 
 
 def passive(fibre: float) -> float:
-    """The force [F0] of the parallel element at a ``fibre`` length [l0]: 0 up to the optimal length."""
+    """The force [F0] of the parallel element at a ``fibre`` length [l0]; 0 up to the optimal length."""
     return max(math.expm1(_PASSIVE * (fibre - 1) / _PASSIVE_STRAIN) / math.expm1(_PASSIVE), 0.0)
 
 
 def tendon(strain: float) -> float:
-    """The force [F0] of the tendon: 0 if it is slack, then an exponential toe, then the tangent at the end of the toe."""
+    """The force [F0] of the tendon at a ``strain``: 0 if it is slack, then an exponential toe, then the tangent at its end."""
     if strain <= 0:
         return 0.0
     if strain <= _TOE_STRAIN:
@@ -167,10 +173,10 @@ def _strain(force: float) -> float:
 
 
 def inverse_hyperbola(force: float, curvature: float) -> float:
-    """The shortening velocity, relative to its maximum, at a ``force`` relative to the isometric force: eq. 5.1 solved for v.
+    """The velocity of shortening divided by its maximum, at a ``force`` divided by the isometric force: eq. 5.1 solved for v.
 
-    In lengthening the force rises to 1.4 along a hyperbola that is twice as steep at 0 (Thelen 2003). Tangents continue both curves
-    beyond their ends.
+    In lengthening the force rises to 1.4 along a hyperbola that is twice as steep at velocity 0 (Thelen 2003). Beyond their ends
+    both curves continue as tangents.
     """
     slope, rise = 2 * (1 + 1 / curvature), _LENGTHENING - 1
     if force < 0:  # shortening faster than without load

@@ -1,4 +1,4 @@
-"""Lines between bones: ends and via-points, fixed, conditional on a joint's angle or moving with it (report 5.1, Figure 5.2)."""
+"""Lines between bones through via-points, some of which depend on the angle of a joint. Report section 5.1, Figure 5.2."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,24 +17,25 @@ from fem_reference.foundations.units import Angle, Point
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import Bone, Joint
 
-# An angle outside a range by less than this [rad] counts as at its end, up to rounding.
+# An angle that is outside a range by less than this [rad] counts as inside, up to rounding.
 _ROUNDING = 1e-9
 
 
 class CurvePoint(Record):
-    """A ``position`` on a bone, in coordinates of the rest state, at an ``angle`` of a joint."""
+    """A point of a curve: the ``position`` on a bone, in coordinates of the rest state, at an ``angle`` of a joint."""
 
     angle: Angle
     position: Point
 
 
 class Via(Record):
-    """A point of every fibre, which moves with a ``bone``. ``at``: its position at rest, as a fraction of the fibre's length.
+    """A point of each fibre that moves with a ``bone``.
 
-    ``within``: the minimum and maximum angle of the ``joint`` at which lines pass through the point; at other angles they omit
-    it. ``curve``: its positions on the bone at some angles of the joint, the same for all fibres. Between these angles the point
-    moves along Catmull-Rom splines, with the slopes of parabolas through neighbouring positions; beyond them it stays at the
-    first or last position. ``at`` then only determines the order of the points.
+    ``at``: the position of the point at rest, as a fraction of the fibre's length. ``joint``: a joint whose angle affects the
+    point. ``within``: the minimum and maximum angle at which lines pass through the point; at other angles they skip it. ``curve``:
+    positions of the point on the bone at some angles, which are the same for all fibres. Between these angles the point moves along
+    Catmull-Rom splines, with the slopes of parabolas through neighbouring positions; beyond them it stays at the first or last
+    position. With ``curve``, ``at`` only determines the order of the points.
     """
 
     at: Annotated[float, Field(gt=0, lt=1)]
@@ -57,7 +58,7 @@ class Via(Record):
 
 @dataclass(frozen=True)
 class Guided:
-    """A via-point and the ``joint`` on whose angle it depends."""
+    """A via-point ``via`` that depends on the angle of a ``joint``."""
 
     via: Via
     joint: Joint
@@ -68,7 +69,7 @@ class Guided:
         return bool(low - _ROUNDING <= self.joint.angle_of(number) <= high + _ROUNDING)
 
     def position(self, number: int) -> Floats:
-        """The point (3,) [mm] of a ``curve`` on its bone, in coordinates of the rest state."""
+        """The point (3,) [mm] on the ``curve`` of the via-point at frame ``number``, in coordinates of the rest state."""
         angles = [point.angle for point in self.via.curve]
         places = np.array([point.position for point in self.via.curve])
         angle = np.clip(self.joint.angle_of(number), angles[0], angles[-1])
@@ -79,8 +80,10 @@ class Guided:
 
 @dataclass(frozen=True, eq=False)
 class Passed:
-    """The points (k, q + 1, 3) [mm] on k lines at a frame, each on the bone ``on`` (k, q + 1), with q parts between them, counted
-    line by line. Point j of the fibres is on part ``part[j]``, at the fraction ``share[j]`` of its length.
+    """The fixed points through which k lines pass at a frame. They divide each line into q parts.
+
+    ``points`` (k, q + 1, 3) [mm]: positions. ``on`` (k, q + 1): the index of the bone of each point. Parts are numbered from 0, one
+    line after the other. Point j of the fibres is on part ``part[j]``, at the fraction ``share[j]`` of the length of this part.
     """
 
     points: Floats
@@ -91,9 +94,11 @@ class Passed:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """A line for each of k fibres of ``sizes`` (k,) points: p parts between fixed points at the fractions ``places`` of its length.
+    """A line for each of k fibres, with p + 1 fixed points.
 
-    ``fixed`` (k, p + 1, 3) [mm]: positions at rest, on ``bones[on]``, on (k, p + 1); ``guided``: points that depend on a joint.
+    ``fixed`` (k, p + 1, 3) [mm]: positions of the fixed points at rest. ``on`` (k, p + 1): the index, in ``bones``, of the bone
+    with which each point moves. ``sizes`` (k,): the number of points of each fibre. ``places`` (p + 1,): the positions of the fixed
+    points as fractions of the fibre's length. ``guided``: the via-points that depend on a joint, by index.
     """
 
     bones: tuple[Bone, ...]
@@ -104,7 +109,7 @@ class Lines:
     guided: dict[int, Guided]
 
     def at(self, number: int) -> Passed:
-        """The points through which the lines pass at frame ``number``."""
+        """The fixed points through which the lines pass at frame ``number``."""
         resting, moved = np.array(self.fixed), np.array(self.fixed)
         for j, one in self.guided.items():
             if one.via.curve:
@@ -117,7 +122,10 @@ class Lines:
 
 
 def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: str) -> Lines:
-    """The lines of a muscle through ``vias`` or ``spread`` points; InputError below ``place`` if the muscle cannot have them."""
+    """The lines of a muscle through the via-points ``vias``, or through a number ``spread`` of evenly spaced via-points.
+
+    Raises InputError, with a key inside ``place``, if a bone or joint does not exist or the fibres have too few points.
+    """
     fibres, sizes, count = problem.fibres, np.diff(problem.fibres.offsets), len(vias) + spread
     if sizes.min() < count + 2:  # checked first, as ``spread`` may be too large for memory
         got = f"fibre {sizes.argmin()} of {sizes.min()} points"
@@ -139,7 +147,7 @@ def lines_of(problem: MuscleProblem, vias: tuple[Via, ...], spread: int, place: 
 
 
 def along(points: Floats, places: list[float]) -> Floats:
-    """The points (k, 3) at the fractions ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
+    """The points (k, 3) on the polyline ``points`` (n, 3) at the fractions ``places`` (k,) of its length."""
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     wanted = np.array(places) * travelled[-1]
     return np.column_stack([np.interp(wanted, travelled, axis) for axis in points.T])
@@ -147,23 +155,25 @@ def along(points: Floats, places: list[float]) -> Floats:
 
 @lru_cache(maxsize=64)
 def _layout(sizes: tuple[int, ...], places: tuple[float, ...]) -> tuple[Ints, Floats]:
-    """The part with each point of lines of these ``sizes``, counted line by line, and the fraction of the part before the point."""
+    """The ``part`` and ``share`` of :class:`Passed` for fibres of ``sizes`` points with fixed points at fractions ``places``."""
     part, share = zip(*(_spread(size, list(places)) for size in sizes), strict=True)
     return np.concatenate([found + i * (len(places) - 1) for i, found in enumerate(part)]), np.concatenate(share)
 
 
 def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
-    """The part of each point (count,) of a line and the fraction of it before the point; points lie evenly between fixed points."""
+    """The ``part`` and ``share`` of :class:`Passed` for a line of ``count`` points, which are evenly spaced in each part."""
     at = np.rint(np.array(places) * (count - 1)).astype(np.int64)
     steps = np.arange(len(at))
-    at = np.maximum.accumulate(at - steps) + steps  # each at least one point after the previous one
+    at = np.maximum.accumulate(at - steps) + steps  # each index is larger than the one before
     at = np.minimum(at, count - 1 - steps[::-1])
     part = np.clip(np.searchsorted(at, np.arange(count), side="right") - 1, 0, len(at) - 2)
     return part, (np.arange(count) - at[part]) / np.diff(at)[part]
 
 
 def nearest_bones(problem: MuscleProblem, points: Floats, place: str) -> Ints:
-    """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
+    """The index (n,) of the bone whose attachment has the vertex nearest to each of ``points`` (n, 3) [mm]. Raises InputError at
+    ``place`` if the muscle has no attachments.
+    """
     if not problem.attached:
         raise InputError(place, "a muscle without attachments", "attachments to which lines are fixed")
     ends = [problem.surface.points[attached.vertices] for attached in problem.attached]
@@ -173,7 +183,7 @@ def nearest_bones(problem: MuscleProblem, points: Floats, place: str) -> Ints:
 
 
 def index(named: tuple[Bone, ...] | tuple[Joint, ...], name: str, place: str) -> int:
-    """The index of the item with this ``name``; InputError at ``place`` if there is none."""
+    """The index of the bone or joint with this ``name``. Raises InputError at ``place`` if there is none."""
     names = [one.name for one in named]
     if name not in names:
         want = f"one of {', '.join(names)}" if names else "a joint, but the case has none"

@@ -1,4 +1,4 @@
-"""Adaptive load steps from frame to frame: halve on failure, grow on easy steps, never skip a requested frame."""
+"""Adaptive load steps from frame to frame: a step is halved if it fails and grows if it was easy, and no frame is skipped."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -7,15 +7,16 @@ from dataclasses import dataclass, replace
 from fem_reference.runs.contents import Status
 from fem_reference.solvers.common.state_checks import Trouble
 
-EASY = 5  # Newton iterations up to which the next step may grow
+EASY = 5  # the maximum number of Newton iterations after which the next step grows
 GROWTH = 1.5
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """The record of a Newton solve at one load: its ``status``, which becomes the status of the run if the solve finally fails; the
-    number of ``iterations``; the norms of the ``residuals`` [N, mm3] before the first iteration and after each; for a failure a
-    ``detail``: a sentence that begins with its subject.
+    """The record of a Newton solve at one load.
+
+    ``status``: the status of the solve, and of the run if it ends here. ``iterations``: the number of iterations. ``residuals`` [N,
+    mm3]: the norms before the first iteration and after each. ``detail``: for a failure, a sentence that begins with its subject.
     """
 
     status: Status
@@ -25,18 +26,20 @@ class Attempt:
 
     @property
     def converged(self) -> bool:
-        """True if an equilibrium was found and no check refused it."""
+        """True if an equilibrium was found and every check accepted it."""
         return self.status == "converged"
 
     def refused(self, why: Trouble) -> "Attempt":
-        """This converged attempt as a failure, because a check refuses its state."""
+        """A copy of this converged attempt as a failure, because a check found trouble ``why`` with the state."""
         return replace(self, status=why.status, detail=f"Newton's method converged, but {why.sentence}")
 
 
 @dataclass(frozen=True)
 class Step:
-    """The steps to a requested ``frame``: load steps, Newton iterations and cut-backs since the previous frame; the ``last``
-    attempt; the frame of the last converged state (``at``); the ``size`` of the next load step.
+    """The load steps from the previous requested frame to ``frame``.
+
+    ``steps``, ``iterations``, ``cutbacks``: the number of load steps, Newton iterations and cut-backs. ``last``: the last attempt.
+    ``at``: the frame number of the last converged state. ``size``: the size of the next load step.
     """
 
     frame: float
@@ -50,7 +53,10 @@ class Step:
 
 @dataclass(frozen=True)
 class StepSizes:
-    """The sizes of the ``first``, smallest and largest load step, in frame numbers; a step ends at each of ``stops``, in order."""
+    """The sizes of load steps, in frame numbers: the ``first``, the ``smallest`` and the ``largest``, None without a maximum.
+
+    ``stops``: increasing frame numbers at which a load step must end.
+    """
 
     first: float
     smallest: float
@@ -58,7 +64,7 @@ class StepSizes:
     stops: tuple[float, ...] = ()
 
     def goals(self, at: float, frame: float) -> tuple[float, ...]:
-        """The stops between ``at`` and a ``frame``, and the frame itself."""
+        """The stops between the frame numbers ``at`` and ``frame``, followed by ``frame``."""
         near = 1e-9 * max(1.0, abs(at), abs(frame))
         return (*(stop for stop in self.stops if at + near < stop < frame - near), float(frame))
 
@@ -70,10 +76,11 @@ def march(
     recall: Callable[[float], bool] = lambda _: False,
     last_resort: Callable[[], bool] = lambda: False,
 ) -> Iterator[Step]:
-    """Go from ``frames[0]`` (at rest, or the frame at which the run continues) through every frame. ``attempt`` solves at a load
-    from the last converged state, and must restore that state if it fails. A frame for which ``recall`` finds an earlier state
-    needs no step. Before giving up, the loop calls ``last_resort`` to change the solution method; if that returns True, it tries
-    the load steps again. The loop ends after the first frame that cannot be reached.
+    """Yield the steps to each of ``frames`` after the first, which is at rest or is the frame from which the run continues.
+
+    ``attempt``: solve at a load from the last converged state, and restore that state on failure. ``recall``: return True if an
+    earlier state is reused for a frame, which then needs no step. ``last_resort``: called before the loop gives up; if it returns
+    True, the solution method has changed and load steps are tried again. The loop ends at the first frame that cannot be reached.
     """
     largest = math.inf if steps.largest is None else steps.largest
     at, step = float(frames[0]), min(steps.first, largest)
@@ -84,7 +91,7 @@ def march(
             if goal == frame and recall(frame):
                 at = goal
             while at < goal:
-                left = goal - at  # divided into equal steps of about ``step``, so that no step is tiny
+                left = goal - at  # this is divided into equal steps of about ``step``, so that the last one is not tiny
                 size = left / max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))
                 then = goal if size == left else at + size
                 result = attempt(then)

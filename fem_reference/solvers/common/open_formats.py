@@ -1,4 +1,4 @@
-"""A problem in common formats: PLY, VTU, MSH, VTK, CSV, JSON. Lengths in mm, indices from 0."""
+"""Export of a problem to common formats (PLY, VTU, MSH, VTK, CSV, JSON), with lengths in mm and indices from 0."""
 
 import csv
 import io
@@ -28,7 +28,7 @@ CONVENTIONS = {
 
 
 def write(problem: MuscleProblem, folder: Path, of: Mapping[str, str]) -> None:
-    """Write the export of a ``problem``, without documentation, into ``folder``; ``of``: facts that identify its case."""
+    """Write all files of a ``problem``, without documentation, into ``folder``. ``of``: facts that identify the case."""
     (folder / "bones").mkdir()
     files.write_surface(folder / "muscle.ply", problem.surface, problem.surface.points)
     for bone, name in zip(problem.bones, bone_files(problem), strict=True):
@@ -44,7 +44,7 @@ def write(problem: MuscleProblem, folder: Path, of: Mapping[str, str]) -> None:
 
 
 def bone_files(problem: MuscleProblem) -> list[str]:
-    """The file of each bone: numbered, as the name of a bone may be any text."""
+    """The file names of the bones, which are numbered because the name of a bone may be any text."""
     return [f"bones/{i}.ply" for i in range(len(problem.bones))]
 
 
@@ -65,15 +65,15 @@ def _write_tables(problem: MuscleProblem, folder: Path) -> None:
 
 
 def write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[object]]) -> None:
-    """Write a table, headed by the names of its ``columns``."""
+    """Write a table: a row with the names of the ``columns``, then the rows ``entries``."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([columns, *entries])
     files.write_text(path, text.getvalue())
 
 
 def facts(problem: MuscleProblem) -> dict[str, Any]:
-    """The facts that mesh files lack: units, conventions, frames, bones, attachments, names of regions (their shares are in the
-    files of tets), and effects with the unit of every parameter.
+    """The facts that are not in mesh files: units, conventions, frames, bones, attachments, names of regions, and effects with the
+    unit of each parameter. The shares of regions are stored in the files with tetrahedra.
     """
     contact = problem.contact
     bones = [
@@ -85,7 +85,7 @@ def facts(problem: MuscleProblem) -> dict[str, Any]:
         "units": UNITS,
         "conventions": CONVENTIONS,
         "frames": list(problem.frames),
-        "interval": {"value": problem.interval, "unit": "s", "of": "a frame number to the next"},
+        "interval": {"value": problem.interval, "unit": "s", "of": "the time between successive frame numbers"},
         "bones": bones,
         "attachments": [
             {"name": attached.attachment, "bone": attached.bone.name, "stiffness": attached.stiffness, "unit": "MPa/mm"}
@@ -98,7 +98,7 @@ def facts(problem: MuscleProblem) -> dict[str, Any]:
 
 
 def _bone(bone: Bone) -> dict[str, Any]:
-    """A bone as scene files describe it: its closed form, if it has one, its motion, and the errors of its distance [mm]."""
+    """The facts about a bone: the name, the closed form if there is one, the motion, and the errors of distances to it [mm]."""
     form = {name: asdict(bone.solid) for name, form in CLOSED_FORMS.items() if isinstance(bone.solid, form)}
     found: dict[str, Any] = {"name": bone.name, **form}
     if (motion := bone.motion) is not None:
@@ -111,7 +111,7 @@ def _bone(bone: Bone) -> dict[str, Any]:
 
 
 def _effect(effect: Effect) -> dict[str, Any]:
-    """The name of an effect, its law in words, and its parameters, each with its value and unit."""
+    """The facts about an effect: the name, the law in words, and the value and unit of each parameter."""
     values = effect.model_dump(mode="json")
     parameters = {name: {"value": values[name], "unit": unit} for name, _, unit in effect.parameters}
     there = {"in": region} if (region := region_of(effect)) else {}
@@ -119,7 +119,7 @@ def _effect(effect: Effect) -> dict[str, Any]:
 
 
 def write_lines(path: Path, lines: Polylines) -> None:
-    """Write the polylines as legacy VTK text, with coordinates in full precision."""
+    """Write polylines as a legacy VTK text file, with coordinates in full precision."""
     ends = lines.offsets.tolist()
     cells = [" ".join(map(str, (b - a, *range(a, b)))) for a, b in pairwise(ends)]
     head = ["# vtk DataFile Version 3.0", "fibres at rest, mm", "ASCII", "DATASET POLYDATA"]

@@ -1,4 +1,4 @@
-"""Programs of other people as subprocesses: their time and memory, a time limit, and the end of every process that they start."""
+"""Other people's programs as subprocesses: measured time and memory, a time limit, and cleanup of all processes they start."""
 
 import os
 import shutil
@@ -16,18 +16,20 @@ from typing import IO
 from fem_reference.foundations.subprocesses import peak_memory, processor_times
 from fem_reference.runs.contents import Status
 
-# The ratio of the limit of clock time to the limit of processor time: beyond this the machine is too busy, or the program waits.
+# The limit on clock time divided by the limit on processor time. A program that takes longer waits, or the machine is too busy.
 CLOCK = 10
-# The time between two checks of a program: a fraction of the clock time so far, but within two limits [s].
+# The time between two checks of a program: a fraction of the clock time so far, between a minimum and a maximum [s].
 _SHARE, _GLANCES = 0.05, (0.05, 1.0)
-_TAIL = 4096  # the number of bytes that are read from the end of a program's output
+_TAIL = 4096  # the number of bytes that are read at the end of a program's output
 
 
 @dataclass(frozen=True)
 class Ended:
-    """The end of a program: its exit status ``code`` (negative: the signal), clock time and processor time [s] including processes
-    for which it waited, the peak memory [MB] of the largest process at the last check, the last printed line, and the limit that
-    ended it.
+    """The end of a program.
+
+    ``code``: the exit status; if negative, the signal. ``seconds``: the clock time. ``processor``: the processor time [s],
+    including that of processes for which the program waited. ``memory`` [MB]: the maximum peak memory of a process in all checks.
+    ``said``: the last line that was printed. ``limit``: the status and the reason if a limit ended the program, otherwise None.
     """
 
     code: int
@@ -39,13 +41,16 @@ class Ended:
 
 
 def found(word: str, directory: Path) -> Path | None:
-    """The file of a program called ``word``: in the ``directory`` if the word has a slash, else on the PATH."""
+    """The executable file of a program: relative to ``directory`` if ``word`` contains a slash, otherwise on the PATH.
+
+    None if there is no such file.
+    """
     path = shutil.which(str(directory / word) if os.sep in word else word)
     return None if path is None else Path(path)
 
 
 def modules(folder: Path) -> set[Path]:
-    """The Python files in a ``folder`` and below it, except in caches, hidden folders and virtual environments."""
+    """The Python files in a ``folder`` and its subfolders, except in caches, hidden folders and virtual environments."""
     found = set[Path]()
     for place, folders, names in folder.walk():
         inner = [name for name in folders if name != "__pycache__" and not name.startswith(".")]
@@ -55,9 +60,10 @@ def modules(folder: Path) -> set[Path]:
 
 
 def run(words: list[str], directory: Path, time_limit: float) -> Ended:
-    """Run a program in a ``directory`` to its end, without a shell and without input; none of its processes outlives the call.
+    """Run a program in ``directory``, without a shell and without input, and wait for its end. No process outlives the call.
 
-    More than ``time_limit`` [s] of processor time, or ``CLOCK`` times as much elapsed time, ends it. OSError if it does not start.
+    ``words``: the program and its arguments. ``time_limit`` [s]: the limit on processor time; the limit on clock time is ``CLOCK``
+    times as long. Raises OSError if the program does not start.
     """
     with TemporaryFile() as printed:
         begin = time.perf_counter()
@@ -74,7 +80,7 @@ def run(words: list[str], directory: Path, time_limit: float) -> Ended:
 
 @contextmanager
 def _started(words: list[str], directory: Path, printed: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
-    """A context with the process, in its own session; at the end of the context all processes of this session are killed."""
+    """A context with the process, which has a new session. All processes of this session are killed at the end of the context."""
     process = subprocess.Popen(
         words, cwd=directory, stdin=subprocess.DEVNULL, stdout=printed, stderr=printed, start_new_session=True
     )
@@ -90,15 +96,17 @@ def _started(words: list[str], directory: Path, printed: IO[bytes]) -> Iterator[
 
 
 def _kill(process: int) -> None:
-    """Kill a running process and all its descendants, including those in other sessions."""
+    """Kill a running ``process`` and all of its descendants, including those in other sessions."""
     for number in processor_times(process) or (process,):
         with suppress(ProcessLookupError):
             os.kill(number, signal.SIGKILL)
 
 
 class _Watch:
-    """A thread that kills a ``process`` that takes more than ``limit`` [s]; ``overran``: the reason, if it was killed; ``memory``
-    [MB]: the maximum peak of its processes (the peak in ``os.wait4`` includes the memory of the process that starts them).
+    """A thread that kills a ``process`` after ``limit`` [s] of processor time, or after ``CLOCK`` times as much clock time.
+
+    ``overran``: the status and the reason if it was killed, otherwise None. ``memory`` [MB]: the maximum peak memory of one of its
+    processes. (The peak from ``os.wait4`` is not used, as it includes the memory of the process that starts the program.)
     """
 
     def __init__(self, process: int, limit: float) -> None:
@@ -124,7 +132,7 @@ class _Watch:
 
 
 def _last_line(printed: IO[bytes]) -> str:
-    """The last line that was printed; empty if there is none."""
+    """The last line that the program ``printed``; empty if there is none."""
     size = printed.seek(0, os.SEEK_END)
     printed.seek(max(0, size - _TAIL))
     lines = [line for line in printed.read().decode(errors="replace").splitlines() if line.strip()]

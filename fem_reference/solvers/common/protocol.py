@@ -1,4 +1,4 @@
-"""Solver protocol: the functions of solvers, and the records in which their files offer them."""
+"""The solver protocol: the types of a solver's functions, and the records in which its file offers these functions."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,20 +16,20 @@ from fem_reference.runs.writer import CutOff
 Moves = Literal["surface", "tetrahedra", "lines", "nothing"]
 
 
-# Solves a problem of one type and passes every requested frame to a sink as it is reached. A physical failure is a status with a
-# sentence, never an exception; earlier frames remain. A scalar field is one frame, NaN if the status is a failure.
+# Solves a problem and passes each requested frame to a sink as soon as it is reached. A physical failure is reported as a status
+# with a sentence, never as an exception; earlier frames are kept. A scalar field is a single frame, which is NaN after a failure.
 type Solve[P, S: Record] = Callable[[P, S, Sink], Outcome]
-# Continues a run that was cut off, from the last stored frame with a complete state, else from the first frame; ends as the
-# uninterrupted run would have ended.
+# Continues a run that was cut off, from the last stored frame with a complete state, otherwise from the first frame. The result is
+# that of an uninterrupted run.
 type GoOn[P, S: Record] = Callable[[P, S, Sink, CutOff], Outcome]
-# Raises InputError, with a key below a given place, if the settings do not suit the effects of a scene.
+# Raises InputError, with a key inside a given place, if the settings do not suit the effects of a scene.
 type CheckEffects[S: Record] = Callable[[S, tuple[Effect, ...], str], None]
-# Raises InputError, with a key below a given place, if settings do not suit bones, attachments, fibres or boundary of a case.
+# Raises InputError, with a key inside a given place, if the settings do not suit bones, attachments, fibres or boundary of a case.
 type CheckProblem[S: Record] = Callable[[S, Any, str], None]
 
 
 class TableRow(NamedTuple):
-    """A row of the page table-5-1: its ``name``, its ``kind`` in the report's table, and the ``settings`` for every scene."""
+    """A row of the page table-5-1: the ``kind`` of method in the report's table, the ``name``, and ``settings`` for all scenes."""
 
     kind: str
     name: str
@@ -38,12 +38,12 @@ class TableRow(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Solver[P, S: Record]:
-    """The record in which a solver's file offers ``solve`` for one task.
+    """A record in which the file of a solver offers the function ``solve`` for one ``task``.
 
-    ``settings``: the record of its settings. ``example``: some of them, as scene files write them, for contract tests.
-    ``require``: raises MissingSoftware or InputError if software for the settings is missing. ``check_problem``: for settings that
-    refer to the contents of a case. ``slow``: True if it takes more than a few seconds on a small problem. ``go_on``: for slow
-    solvers, continues a run; all others begin again from rest. ``table``: its rows of the page table-5-1.
+    ``settings``: the type of the settings. ``example``: settings as in a scene file, for contract tests. ``require``: a function
+    that raises MissingSoftware or InputError if software for the settings is missing. ``check_problem``: the check of settings that
+    refer to the contents of a case. ``slow``: True if a small problem takes more than a few seconds. ``go_on``: the function that
+    continues a run of a slow solver; other solvers begin again from rest. ``table``: the rows of the solver on the page table-5-1.
     """
 
     task: ClassVar[Task]
@@ -59,15 +59,15 @@ class Solver[P, S: Record]:
     go_on: GoOn[P, S] | None = None
 
     def record(self, given: Mapping[str, Any], place: str) -> type[S]:  # noqa: ARG002
-        """The type of the settings ``given`` at a ``place``: always the same, unless the given settings add keys."""
+        """The type of the settings; solvers whose ``given`` settings define further keys override this. ``place``: for messages."""
         return self.settings
 
     def fills(self, settings: S) -> bool:  # noqa: ARG002
-        """True if the solver needs a meshed problem."""
+        """True if the solver needs a problem with a mesh."""
         return True
 
     def run(self, problem: P, settings: S) -> Run:
-        """The run of a problem, in memory."""
+        """Solve a problem in memory and return the run."""
         frames: list[Frame] = []
         outcome = self.solve(problem, settings, frames.append)
         return collected(frames, outcome)
@@ -75,10 +75,12 @@ class Solver[P, S: Record]:
 
 @dataclass(frozen=True, kw_only=True)
 class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
-    """A solver of muscles. ``moves``: the carrier of its unknowns, whose mesh determines accuracy and cost; ``check_effects``: None
-    unless it simulates the effects of a scene; ``fibres``: True if a surface solver with these settings needs fibres; otherwise it
-    receives a ``Setup``, without tetrahedra in the muscle. ``depends_on``: the order of vertices or the size of the muscle, if the
-    result depends on it.
+    """A solver of muscles.
+
+    ``moves``: the carrier of the unknowns, whose resolution determines accuracy and cost. ``depends_on``: "order" or "size" if the
+    result depends on the order of the vertices or on the size of the muscle. ``check_effects``: the check of the effects of a
+    scene; None if the solver does not model them. ``fibres``: True if a surface solver with these settings needs fibres; otherwise
+    the solver receives a ``Setup``, in which the muscle has no tetrahedra.
     """
 
     task = "solve"
@@ -90,11 +92,11 @@ class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
     fibres: Callable[[S], bool] = lambda _: False
 
     def moved(self, settings: S) -> Moves:  # noqa: ARG002
-        """The carrier of the unknowns with these settings."""
+        """The carrier of the unknowns for these settings."""
         return self.moves
 
     def fills(self, settings: S) -> bool:
-        """True if the solver needs the muscle filled with tetrahedra and fibres."""
+        """True if the solver needs a muscle with tetrahedra and fibres."""
         return self.moves not in ("surface", "nothing") or self.fibres(settings)
 
 
@@ -119,15 +121,17 @@ AnySolver = Solver[Any, Any]
 
 @dataclass(frozen=True)
 class Trade:
-    """Marks a settings key that trades time for accuracy: a ``ladder`` of useful values, as scene files write them, from the
-    fastest to the most accurate. Some values may be refused for a scene, such as elements for other cells or effects.
+    """A mark on a key of the settings that trades time for accuracy.
+
+    ``ladder``: useful values, as in scene files, from the fastest to the most accurate. A scene may not allow all of them, such as
+    an element for another kind of cell.
     """
 
     ladder: tuple[float | str, ...]
 
 
 def trades(settings: type[Record]) -> dict[str, tuple[float | str, ...]]:
-    """The keys of ``settings`` that trade time for accuracy, each with its ladder."""
+    """The ladders of the keys of ``settings`` that trade time for accuracy, by key."""
     return {
         key: entry.ladder
         for key, field in settings.model_fields.items()

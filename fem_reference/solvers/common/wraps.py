@@ -1,4 +1,4 @@
-"""Obstacles on bones around which lines wrap: their settings, the paths around them, and points inside them."""
+"""Obstacles around which lines wrap: settings of obstacles, paths around obstacles, and fixed points inside obstacles."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -20,12 +20,12 @@ from fem_reference.problems.setup import Bone
 from fem_reference.scenes.muscle import Axis, CaseSphere, Rod
 from fem_reference.solvers.common.lines import index
 
-# A fixed point less than this [mm] deep in an obstacle counts as on its surface, up to rounding.
+# A fixed point whose depth inside an obstacle is less than this [mm] counts as on the surface, up to rounding.
 _TOUCHES = 1e-6
 
 
 class Ellipsoid(Record):
-    """An ellipsoid about ``centre`` with semi-axes ``radii`` along x, y, z, rotated by the rotation vector ``turn``."""
+    """An ellipsoid at ``centre``. ``radii``: the semi-axes along x, y and z, which are rotated by the rotation vector ``turn``."""
 
     centre: Point
     radii: tuple[PositiveLength, PositiveLength, PositiveLength]
@@ -33,7 +33,10 @@ class Ellipsoid(Record):
 
 
 class Torus(Record):
-    """A ring with a hole through which lines pass: a tube of radius ``tube`` about a circle of ``radius`` around ``axis``."""
+    """A ring with a hole through which lines may pass.
+
+    The ring is a tube of radius ``tube`` around a circle, which has a ``centre``, a ``radius`` and an ``axis``.
+    """
 
     centre: Point
     axis: Axis
@@ -44,9 +47,9 @@ class Torus(Record):
 
 
 class ObstacleOn(Record):
-    """One ``sphere``, ``cylinder``, ``ellipsoid`` or ``torus``, placed at rest, which moves with a ``bone``.
+    """An obstacle that moves with a ``bone``: a ``sphere``, ``cylinder``, ``ellipsoid`` or ``torus``.
 
-    A cylinder is infinite; its ``start`` and ``end`` only define the axis.
+    Positions and directions are those in the rest state. A cylinder is infinitely long; ``start`` and ``end`` define its axis.
     """
 
     bone: str
@@ -59,7 +62,7 @@ class ObstacleOn(Record):
 
     @property
     def name(self) -> str:
-        """The kind of shape, as named in messages."""
+        """The kind of shape, for messages."""
         return next(key for key, given in self if key != "bone" and given is not None)
 
     def surface(self) -> Quadric | Ring:
@@ -78,13 +81,19 @@ class ObstacleOn(Record):
 
 @dataclass(frozen=True, eq=False)
 class Wraps:
-    """The obstacles ``given`` on ``bones``. If there is only one, a sphere or a cylinder, paths have a closed form."""
+    """Obstacles on bones. ``given``: the settings of each obstacle. ``bones``: the bone of each obstacle.
+
+    Paths have a closed form if there is a single obstacle and it is a sphere or a cylinder.
+    """
 
     given: tuple[ObstacleOn, ...]
     bones: tuple[Bone, ...]
 
     def around(self, fixed: Floats, number: int) -> Paths | Winding:
-        """The shortest path between each two successive points ``fixed`` (k, q + 1, 3), ordered by line, at a frame."""
+        """The shortest paths at frame ``number`` between successive fixed points of each line, one line after the other.
+
+        ``fixed`` (k, q + 1, 3) [mm]: the fixed points of k lines at this frame.
+        """
         starts, ends = fixed[:, :-1].reshape(-1, 3), fixed[:, 1:].reshape(-1, 3)
         if not self.given:
             return wrapping.straight(starts, ends)
@@ -94,14 +103,20 @@ class Wraps:
         return winding.around(moved, starts, ends)
 
     def inside(self, fixed: Floats, number: int) -> tuple[str, str]:
-        """The key of the obstacle with the deepest fixed point, and its line and depth in words; empty if no point is inside."""
+        """The fixed point that is deepest inside an obstacle at frame ``number``, for an error message.
+
+        Returns the key of the obstacle, and a text with the line and the depth of the point. Both are empty if all of the points
+        ``fixed`` (k, q + 1, 3) [mm] are outside all obstacles.
+        """
         found = []
         for i, surface in enumerate(self._moved(number)):
             points = fixed.reshape(-1, 3)
             depths = np.linalg.norm(surface.pushed(points) - points, axis=1).reshape(len(fixed), -1).max(axis=1)
             found.append((float(depths.max()), int(depths.argmax()), f"obstacle[{i}]"))
         depth, line, name = max(found, default=(0.0, 0, ""))
-        return (name, f"a fixed point of line {line} {depth:.3g} mm inside") if depth > _TOUCHES else ("", "")
+        return (
+            (name, f"a fixed point {depth:.3g} mm inside the obstacle (line {line})") if depth > _TOUCHES else ("", "")
+        )
 
     def __str__(self) -> str:
         return " and ".join(f"the {one.name} on {one.bone}" for one in self.given)
@@ -111,7 +126,7 @@ class Wraps:
 
 
 def wraps_of(problem: MuscleProblem, given: tuple[ObstacleOn, ...], place: str) -> Wraps:
-    """The obstacles of a muscle; InputError below ``place`` if the bone of an obstacle does not exist."""
+    """The obstacles of a muscle from their settings. Raises InputError, with a key inside ``place``, if a bone does not exist."""
     bones = [index(problem.bones, one.bone, join(place, f"obstacle[{i}].bone")) for i, one in enumerate(given)]
     return Wraps(given, tuple(problem.bones[i] for i in bones))
 
@@ -123,5 +138,5 @@ def _pose(turn: Rotation, centre: tuple[float, float, float]) -> Floats:
 
 
 def _onto(axis: Floats) -> Rotation:
-    """A rotation that takes z to an ``axis`` (3,)."""
+    """A rotation of the z axis onto an ``axis`` (3,)."""
     return Rotation.align_vectors([axis / np.linalg.norm(axis)], [[0, 0, 1]])[0]

@@ -1,6 +1,6 @@
-"""An independent solver as a second opinion: Lagrange elements of scikit-fem, solved by scipy's sparse LU factorisation.
+"""An independent second solver: Lagrange elements of scikit-fem, with equations solved by scipy's sparse LU factorisation.
 
-``field`` solves for scalar fields, ``body`` for bodies, whose stress and stiffness are derivatives of energies by ``jets``.
+``field`` solves scalar problems, and ``body`` finds equilibria of bodies, with stress and stiffness from energies by ``jets``.
 """
 
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver
@@ -14,5 +14,5 @@ SOLVES = (
     FieldSolver(settings=ScikitFieldSettings, solve=field.solve, example={}),
     BodySolver(settings=ScikitBodySettings, solve=body.solve, example={}),
 )
-# Functions that solve in memory and return a run.
+# Functions that solve a problem in memory and return the run.
 solve_field, solve_body = SOLVES[0].run, SOLVES[1].run

@@ -1,4 +1,4 @@
-"""Bodies: equilibrium by Newton's method; stress and stiffness by automatic differentiation (jets) of the energies of effects."""
+"""Equilibria of bodies by Newton's method, with stress and stiffness by automatic differentiation (jets) of energies."""
 
 import logging
 import time
@@ -24,18 +24,18 @@ from fem_reference.solvers.scikit_fem.equations import Equations
 log = logging.getLogger(__name__)
 
 _HALVINGS = 10
-_ROUNDING = 1e-14  # of prescribed displacements, as a fraction of the body's size
-_GROWTH = 10.0  # the growth of the residual above which a Newton step is halved
+_ROUNDING = 1e-14  # the rounding error of prescribed displacements, as a fraction of the size of the body
+_GROWTH = 10.0  # a Newton step is halved if the residual grows by at least this factor
 
 
 class ScikitBodySettings(Record):
     """Numerical settings for a body; load steps are in frame numbers.
 
-    ``element``: one of ``body.ELEMENTS``. The load step begins with ``first_step``, by default one step per frame. It grows by
-    half after an easy step (at most 5 Newton iterations) and is halved, down to ``smallest_step``, if Newton's method needs more
-    than ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal forces and
-    of the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are integrated exactly
-    on a straight cell, by default as the element requires.
+    ``element``: one of ``body.ELEMENTS``. ``first_step``: the size of the first load step, by default one step per frame. The size
+    grows by half after an easy step (at most 5 Newton iterations). It is halved, down to ``smallest_step``, if Newton's method
+    needs more than ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal
+    forces and of the residual of the volume equation is below this value. ``quadrature_degree``: the degree of the polynomials that
+    are integrated exactly on a straight cell, by default as the element requires.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
@@ -47,7 +47,7 @@ class ScikitBodySettings(Record):
 
 
 def _check_known(body: Body) -> None:
-    """Raise InputError if a body has a part that this solver does not support."""
+    """Raise InputError if the body contains something that this solver does not support."""
     if body.contact is not None or body.touching:
         name, got = ("touching", "parts that touch") if body.touching else ("contact", "bones")
         raise InputError(name, got, "a body without contact, which this solver does not support")
@@ -60,14 +60,14 @@ def _check_known(body: Body) -> None:
     if timed:
         raise InputError("effects", ", ".join(timed), "effects without rates, as this solver has no time steps")
     if in_situ.among(body.effects) is not None:
-        want = "effects that leave the body at rest, as this solver balances no tension at rest"
+        want = "effects that leave the body at rest, as this solver does not support tension at rest"
         raise InputError("effects", "in_situ", want)
     if any(isinstance(effect, Load) and effect.stored for effect in body.effects):
         raise InputError("effects", "membrane", "other effects: this solver has no surface energies")
 
 
 def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
-    """Compute the states of ``body`` at its frames, up to the first that cannot be reached."""
+    """Compute the states of ``body`` at its frames, up to the first frame that cannot be reached."""
     check(body, settings.element, settings.quadrature_degree)
     _check_known(body)
     begin = time.perf_counter()
@@ -92,14 +92,14 @@ def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
 
 @dataclass(frozen=True, eq=False)
 class _Tangent:
-    """The equations at ``unknowns`` (N,): their ``residual`` (N,) and its derivative ``matrix`` (N, N)."""
+    """The linearised equations at ``unknowns`` (N,): the ``residual`` (N,) and its derivative, the ``matrix`` (N, N)."""
 
     unknowns: Floats
     residual: Floats
     matrix: Any
 
     def step(self, free: Ints, fixed: Ints, gap: Floats) -> Floats:
-        """The Newton step in which the ``fixed`` unknowns change by ``gap``; RuntimeError if it is not unique."""
+        """The Newton step (N,) in which the ``fixed`` unknowns change by ``gap`` (k,). Raises RuntimeError if it is not unique."""
         step = np.zeros_like(self.unknowns)
         step[fixed] = gap
         rows = self.matrix[free]
@@ -108,7 +108,7 @@ class _Tangent:
 
 
 class March:
-    """The unknowns of a body along the path of its frames."""
+    """The unknowns of a body on the load path through its frames."""
 
     def __init__(self, body: Body, settings: ScikitBodySettings) -> None:
         self.body, self.settings = body, settings
@@ -117,10 +117,11 @@ class March:
         self.nodes = {entry.name: self.equations.space.nodes_on(str(entry.on)) for entry in body.prescribed}
 
     def attempt(self, frame: float) -> Attempt:
-        """Solve at ``frame`` from the last state, which is kept if the attempt fails. A state in which det F is not positive, at a
-        quadrature point or a vertex, is *inverted* even if Newton's method converged.
+        """Solve at ``frame``, starting from the last converged state, which is restored if the attempt fails.
+
+        A state in which det F is not positive, at a quadrature point or vertex, is *inverted* even if Newton's method converged.
         """
-        with np.errstate(all="ignore"):  # a step with numbers that are not finite has failed
+        with np.errstate(all="ignore"):  # a step to values that are not finite fails
             attempt, unknowns = self._newton(frame)
             if attempt.converged and (trouble := self._trouble(unknowns, frame)) is not None:
                 attempt = attempt.refused(trouble)
@@ -128,7 +129,7 @@ class March:
         return attempt
 
     def _trouble(self, unknowns: Floats, frame: float) -> Trouble | None:
-        """The trouble with a state in equilibrium: cells inside out, or an energy that is not finite."""
+        """The trouble with a state in equilibrium: inverted cells, or an energy that is not finite; None if there is none."""
         smallest = np.min(self.equations.smallest_determinants(unknowns))
         if not smallest > 0:
             return Trouble("inverted", f"det F fell to {smallest:.3g}")
@@ -137,7 +138,7 @@ class March:
         return None
 
     def _newton(self, frame: float) -> tuple[Attempt, Floats]:
-        """The record of Newton's method at ``frame``, and the last unknowns (N,)."""
+        """The record of Newton's method at ``frame``, and the unknowns (N,) of its last iteration."""
         fixed, wanted = self.fixed(frame)
         free = np.setdiff1d(np.arange(len(self.unknowns)), fixed)
         start, allowed = self.unknowns.copy(), self.settings.newton_iterations
@@ -159,7 +160,7 @@ class March:
                 return ended(f"Newton's method did not converge in {allowed} iterations")
             try:
                 step = now.step(free, fixed, gap)
-            except RuntimeError:  # SuperLU raises it where a pivot is zero
+            except RuntimeError:  # raised by SuperLU if a pivot is zero
                 return ended("the equations have no unique solution")
             then = self._along(now, step, free, np.inf if gap.any() else _GROWTH * residuals[-1], frame)
             if then is None:
@@ -167,7 +168,10 @@ class March:
             now = then
 
     def _along(self, now: _Tangent, step: Floats, free: Ints, limit: float, frame: float) -> _Tangent | None:
-        """The equations after a ``step`` that is shortened until the forces on ``free`` unknowns are below ``limit``."""
+        """The equations after a ``step``, which is halved until the norm of the residual of ``free`` unknowns is below ``limit``.
+
+        None if the norm is never below the limit.
+        """
         for halvings in range(_HALVINGS):
             unknowns = now.unknowns + 0.5**halvings * step
             then = _Tangent(unknowns, *self.equations.assembled(unknowns, frame))
@@ -176,7 +180,7 @@ class March:
         return None
 
     def fixed(self, frame: float) -> tuple[Ints, Floats]:
-        """The unknowns (k,) that are prescribed exactly, without duplicates, and their values (k,) at ``frame``."""
+        """The indices (k,) of unknowns that are prescribed exactly, each once, and their values (k,) at ``frame``."""
         values: dict[int, float] = {}
         for entry in self.body.prescribed:
             if entry.stiffness is None:
@@ -187,7 +191,7 @@ class March:
         return np.array(list(values), np.int64), np.array(list(values.values()))
 
     def state(self, step: Step) -> Frame:
-        """The present state."""
+        """The present state as a frame."""
         equations, unknowns = self.equations, self.unknowns
         places = equations.space.rest + unknowns[: equations.space.rest.size].reshape(-1, 3)
         residual, _ = equations.assembled(unknowns, step.frame, springs=False)
@@ -210,7 +214,7 @@ class March:
         )
 
     def _force(self, entry: Prescribed, places: Floats, residual: Floats) -> tuple[Floats, Floats]:
-        """The force (3,) [N] on the nodes of ``entry``, along its components, and its moment (3,) [N mm] about the origin."""
+        """The force (3,) [N] of a constraint on its nodes, along its components, and the moment (3,) [N mm] about the origin."""
         nodes, components = self.nodes[entry.name], list(entry.components)
         forces = np.zeros((len(nodes), 3))
         forces[:, components] = residual[: places.size].reshape(-1, 3)[nodes][:, components]

@@ -1,4 +1,4 @@
-"""The equations of a body: residual and tangent, summed from energies, loads and springs, each differentiated by jets."""
+"""The equations of a body: residual and tangent are sums over energies, loads and springs, differentiated by jets."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -14,18 +14,18 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body, Prescribed, is_stabilised
 from fem_reference.solvers.scikit_fem.spaces import DISPLACEMENT, PRESSURE, VARIABLES, Points, Space
 
-# The quadrature degree for each displacement element: exact on a straight cell for an energy quadratic in the strain.
+# The quadrature degree for each displacement element. On a straight cell it is exact for an energy that is quadratic in the strain.
 QUADRATURE_DEGREE = {"P1": 2, "P2": 4, "Q1": 3, "Q2": 5}
-_AT_ONCE = 1024  # points, so that their jets fit in a cache
+_AT_ONCE = 1024  # the number of points that are evaluated together, so that their jets fit into a cache
 
 Acting = list[tuple[Effect, float]]
-# A function of p points, their n variables and a frame: the first (n, p) and second (n, n, p) derivatives of the work.
+# A function of p points, their n variables and a frame. It returns first (n, p) and second (n, n, p) derivatives of the work.
 Law = Callable[[Points, list[Any], float], tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A ``law`` at ``points`` that depends only on the variables with the indices ``felt``."""
+    """A term of the equations: a ``law`` at ``points``. ``felt``: the indices of the variables on which the law depends."""
 
     points: Points
     law: Law
@@ -54,7 +54,7 @@ class Equations:
         self.stabilising = self._projection() if is_stabilised(element) else None
 
     def assembled(self, unknowns: Floats, frame: float, springs: bool = True) -> tuple[Floats, Any]:
-        """The residual (N,) [N, mm3] and its tangent (N, N), with the forces of springs if ``springs``."""
+        """The residual (N,) [N, mm3] and the tangent (N, N); ``springs``: include the forces of springs."""
         residual = np.zeros(len(unknowns))
         blocks = []
         for part in self.parts + (self.springs if springs else []):
@@ -70,24 +70,26 @@ class Equations:
         return residual, matrix
 
     def smallest_determinants(self, unknowns: Floats) -> tuple[float, float]:
-        """The smallest det F at quadrature points and at the vertices of the cells; NaN if one is not a number."""
+        """The smallest det F at quadrature points, and the smallest det F at vertices of cells; NaN if some det F is NaN."""
         inside, vertices = (_determinant(points, unknowns).min() for points in (self.inside, self.space.vertices))
         return float(inside), float(vertices)
 
     def volume_ratio(self, unknowns: Floats) -> float:
-        """V / V0."""
+        """The volume of the body divided by its volume at rest."""
         return float((_determinant(self.inside, unknowns) * self.inside.weights).sum() / self.inside.weights.sum())
 
     def energy(self, unknowns: Floats, frame: float) -> float:
-        """The energy [N mm]."""
+        """The stored energy [N mm]."""
         values = np.moveaxis(self.inside.variables(unknowns), -1, 0)
         energy = total_energy(self._acting(frame), self._at(self.inside, list(values), self.inside.fibre))
         stabilising = 0.0 if self.stabilising is None else unknowns @ (self.stabilising @ unknowns) / 2
         return float((energy * self.inside.weights).sum() - stabilising)
 
     def _projection(self) -> Any:
-        """The matrix (N, N) of minus the energy described at ``body.is_stabilised``: M - B^T D^-1 B, with the mass matrices M of
-        the pressure, D of a constant in each cell and B between the two, all divided by twice the shear modulus.
+        """The matrix (N, N) of the negative of the stabilising energy, which ``body.is_stabilised`` describes.
+
+        The matrix is M - B^T D^-1 B. M is the mass matrix of the pressure, D that of constants in each cell, and B the mass matrix
+        that couples these constants and the pressure; all are divided by twice the shear modulus.
         """
         inside, entries = self.inside, self.inside.variables(np.zeros(self.space.size)).reshape(-1, VARIABLES)
         _, curvature = self._energy_law(inside, variables(entries.T), self.body.frames[0])
@@ -109,7 +111,7 @@ class Equations:
         return [(effect, effect.amount(frame)) for effect in self.body.effects]
 
     def _felt(self) -> list[int]:
-        """The indices of variables on which energies depend; the displacement itself is costly and seldom needed."""
+        """The indices of the variables on which energies depend; the displacement, which is costly, is seldom among them."""
         deformed = np.append(np.eye(3).ravel(), np.ones(4)) + 0.1 * np.sin(np.arange(VARIABLES))
         jets = variables(deformed[:, None])
         fibre = None if self.inside.fibre is None else self.inside.fibre[:1, 0]
@@ -127,7 +129,10 @@ class Equations:
         return energy.slope, energy.curvature
 
     def _at(self, points: Points, entries: list[Any], fibre: Floats | None) -> State:
-        """The state of ``points``; shares of regions have the shape of the ``entries``, or are one row if these are jets."""
+        """The state of ``points``, with their 13 variables as ``entries``.
+
+        The shares of regions have the shape of an entry, or are one-dimensional if entries are jets.
+        """
         cells = np.repeat(points.cells, points.places.shape[1])
         shares = self.body.shares(points.places.reshape(-1, 3), cells)
         shape = np.shape(entries[0]) if isinstance(entries[0], np.ndarray) else (-1,)
@@ -135,7 +140,7 @@ class Equations:
 
 
 def _of_cells(part: _Part, points: Points, unknowns: Floats, frame: float) -> tuple[Floats, Floats]:
-    """The forces (m, d) and stiffness (m, d, d) of cells."""
+    """The forces (m, d) and the stiffness (m, d, d) of m cells with d unknowns each."""
     (m, q), n = points.weights.shape, len(part.felt)
     values: list[Any] = list(points.variables(unknowns).reshape(-1, VARIABLES).T)
     for place, jet in zip(part.felt, variables(np.stack([values[i] for i in part.felt])), strict=True):
@@ -149,7 +154,7 @@ def _of_cells(part: _Part, points: Points, unknowns: Floats, frame: float) -> tu
 
 
 def _load_law(load: Load, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
-    """The virtual work of a load: minus its traction times the virtual displacement."""
+    """The derivatives of the virtual work of a load, which is minus the traction times the virtual displacement."""
     assert points.normals is not None
     state = _state(jets, None, load.amount(frame))
     tractions = load.traction(state, list(points.normals.reshape(-1, 3).T))
@@ -157,7 +162,7 @@ def _load_law(load: Load, points: Points, jets: list[Any], frame: float) -> tupl
 
 
 def _spring_law(entry: Prescribed, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
-    """The virtual work of springs that pull towards the prescribed displacement."""
+    """The derivatives of the virtual work of springs that pull towards the prescribed displacement."""
     wanted, pull = entry.path(points.places.reshape(-1, 3), frame), [constant(0.0, jets[0])] * 3
     for i in entry.components:
         pull[i] = entry.stiffness * (jets[9 + i] - wanted[:, i])
@@ -165,7 +170,7 @@ def _spring_law(entry: Prescribed, points: Points, jets: list[Any], frame: float
 
 
 def _along_displacement(forces: Sequence[Jet]) -> tuple[Floats, Floats]:
-    """Forces (3,) as derivatives of the work with respect to the variables on a surface."""
+    """The derivatives of the work of ``forces`` (3,) with respect to the variables: first (13, p), then second (13, 13, p)."""
     along = np.broadcast_shapes(*(force.value.shape for force in forces))
     slope, curvature = np.zeros((VARIABLES, *along)), np.zeros((VARIABLES, VARIABLES, *along))
     for i, force in enumerate(forces):
@@ -174,7 +179,7 @@ def _along_displacement(forces: Sequence[Jet]) -> tuple[Floats, Floats]:
 
 
 def _state(entries: Sequence[Any], fibre: Floats | None, amount: float = 1.0) -> State:
-    """The 13 variables as a state."""
+    """The state with the 13 variables ``entries``."""
     return State(
         F=[entries[0:3], entries[3:6], entries[6:9]],
         displacement=entries[DISPLACEMENT],
@@ -195,7 +200,7 @@ def _determinant(points: Points, unknowns: Floats) -> Floats:
 
 
 def _chunks(points: Points) -> Iterator[Points]:
-    """The points in groups of a few cells."""
+    """The points in groups, each of which has the points of a few cells."""
     m, q = points.weights.shape
     size = max(1, _AT_ONCE // q)
     return (points.part(slice(start, start + size)) for start in range(0, m, size))

@@ -1,7 +1,7 @@
-"""Scalar fields: Lagrange elements assembled by scikit-fem, solved by scipy's sparse LU factorisation.
+"""Scalar fields: Lagrange elements, assembled by scikit-fem, with equations solved by scipy's sparse LU factorisation.
 
-Each triangle in space is laid flat before it is assembled. This preserves lengths and areas within the surface, which is all that
-the equations need; gradients are rotated back into space.
+Each triangle of a surface in space is mapped to a plane before assembly. The map preserves lengths and areas within the surface,
+which suffices for the equations; gradients are rotated back into space.
 """
 
 import time
@@ -23,21 +23,24 @@ from fem_reference.problems.scalar import FieldProblem, at
 from fem_reference.runs.store import Frame, Outcome, Sink
 
 QUADRATURE_DEGREE = 8
-_SINGULAR = 1e15  # condition numbers above this leave no correct digit
-# Elements of orders 1 and 2, for each number of corners of a cell.
+_SINGULAR = 1e15  # with a larger condition number, no digit of the solution is correct
+# The elements of order 1 and 2, by the number of corners of a cell.
 _ELEMENTS = {2: (skfem.ElementLineP1, skfem.ElementLineP2), 3: (skfem.ElementTriP1, skfem.ElementTriP2)}
 
 
 class ScikitFieldSettings(Record):
-    """``form``: the weak form that the ``scene`` names, or plain ``galerkin`` in any scene, to show the effect of stabilisation."""
+    """Settings for scalar fields.
+
+    ``form``: the weak form, either that of the ``scene`` or, to show the effect of stabilisation, plain ``galerkin`` in any scene.
+    """
 
     form: Literal["scene", "galerkin"] = "scene"
 
 
 @dataclass(frozen=True, eq=False)
 class Flat:
-    """A mesh as scikit-fem represents it: ``mesh``, and for each cell the ``frames`` (m, d, t) and ``origins`` (m, d) that map its
-    flat coordinates (t,) to coordinates of the domain (d,).
+    """A ``mesh`` of scikit-fem. ``frames`` (m, d, t) and ``origins`` (m, d) map the flat coordinates (t,) in each cell to
+    coordinates (d,) in the domain.
     """
 
     mesh: Any
@@ -46,7 +49,7 @@ class Flat:
 
 
 def flat(mesh: FieldMesh) -> Flat:
-    """``mesh``, laid flat cell by cell if it is a surface in space."""
+    """The mesh of scikit-fem for ``mesh``. If this is a surface in space, each cell is mapped to a plane."""
     d = mesh.points.shape[1]
     if d < 3:
         kind = skfem.MeshLine if d == 1 else skfem.MeshTri
@@ -59,14 +62,14 @@ def flat(mesh: FieldMesh) -> Flat:
 
 
 def space(problem: FieldProblem) -> tuple[Any, Flat]:
-    """The basis of the problem's elements and its flat mesh."""
+    """The basis of the elements of a problem, and the flat mesh."""
     laid = flat(problem.mesh)
     element = _ELEMENTS[problem.mesh.cells.shape[1]][problem.order - 1]()
     return skfem.Basis(laid.mesh, element, intorder=QUADRATURE_DEGREE), laid
 
 
 def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
-    """Matrix (N, N) and right-hand side (N,) of the weak form, before values are fixed, with nodes in the order of the problem."""
+    """The matrix (N, N) and right-hand side (N,) of the weak form, without fixed values, with nodes in the order of the problem."""
     basis, laid = space(problem)
     slope_of = _slope_weights(basis)
     position = np.einsum("mda,amq->dmq", laid.frames, np.asarray(basis.global_coordinates()))
@@ -94,7 +97,7 @@ def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
 
 
 def solve(problem: FieldProblem, settings: ScikitFieldSettings, sink: Sink) -> Outcome:
-    """Assemble and solve."""
+    """Assemble and solve the equations of a problem, and pass the field to ``sink``."""
     if settings.form == "galerkin":
         problem = replace(problem, tau=None)
     values, outcome = _solved(problem)
@@ -103,7 +106,7 @@ def solve(problem: FieldProblem, settings: ScikitFieldSettings, sink: Sink) -> O
 
 
 def _solved(problem: FieldProblem) -> tuple[Floats, Outcome]:
-    """The values (N,) at the nodes and the outcome."""
+    """The values (N,) at the nodes, which are NaN after a failure, and the outcome."""
     begin = time.perf_counter()
     A, b = assemble(problem)
     assembled = time.perf_counter()
@@ -115,7 +118,7 @@ def _solved(problem: FieldProblem) -> tuple[Floats, Outcome]:
         inner = A[free][:, free].tocsc()
         try:
             factors = splu(inner)
-        except RuntimeError:  # SuperLU raises it where a pivot is zero
+        except RuntimeError:  # raised by SuperLU if a pivot is zero
             return _failed(len(b), "the equations have no unique solution")
         solve, transposed = factors.solve, partial(factors.solve, trans="T")
         inverse = LinearOperator(inner.shape, solve, transposed, solve, dtype=inner.dtype)
@@ -132,7 +135,7 @@ def _failed(count: int, why: str) -> tuple[Floats, Outcome]:
 
 
 def _slope_weights(basis: Any) -> Floats:
-    """Weights (m, t, q) that give the derivative of a linear function from its values at the quadrature points of a cell.
+    """The weights (m, t, q) by which the values of a linear function at the q quadrature points of a cell give its derivatives.
 
     The gradient of a quadratic function is linear, so the weights give its Laplacian, which scikit-fem does not offer.
     """
@@ -141,7 +144,7 @@ def _slope_weights(basis: Any) -> Floats:
 
 
 def order_of(problem: FieldProblem, basis: Any) -> Any:
-    """The index (N,) of the unknown of scikit-fem at each node of the problem."""
+    """The index (N,) of scikit-fem's unknown at each node of the problem."""
     vertices = basis.nodal_dofs[0]
     if problem.order == 1:
         return vertices
@@ -155,7 +158,7 @@ def order_of(problem: FieldProblem, basis: Any) -> Any:
 
 
 def _fluxes(problem: FieldProblem) -> Floats:
-    """The flow (N,) through the boundary: the integral of ``k * slope`` times each shape function, by Gauss's 3-point rule."""
+    """The integral (N,) over the boundary of ``k * slope`` times each shape function, by the 3-point Gauss rule on edges."""
     b = np.zeros(len(problem.fixed))
     for flux in problem.fluxes:
         ends = problem.mesh.points[flux.facets]

@@ -1,7 +1,7 @@
-"""Elements of scikit-fem on the cells of a body, evaluated at points of its cells and facets.
+"""Elements of scikit-fem on the cells of a body, evaluated at points in cells and on facets.
 
-An effect may depend on 13 variables at a point: the entries of F row by row, the displacement and the pressure. Each is linear in
-the unknowns of a cell: the three components of the displacement node by node, then the pressures.
+An effect may depend on 13 variables at a point: the entries of F row by row, the displacement and the pressure. Each variable is an
+affine function of the unknowns of the cell, which are the three displacement components node by node, then the pressures.
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ VARIABLES = 13
 DISPLACEMENT = slice(9, 12)
 PRESSURE = 12
 _REST = np.append(np.eye(3).ravel(), np.zeros(4))
-# For each kind of cell: meshes of degrees 1 and 2, and elements of degrees 0 to 2.
+# The meshes of degree 1 and 2, and the elements of degree 0 to 2, for each kind of cell.
 _MESHES = {"tetrahedron": (skfem.MeshTet1, skfem.MeshTet2), "hexahedron": (skfem.MeshHex1, skfem.MeshHex2)}
 _ELEMENTS = {
     "tetrahedron": (skfem.ElementTetP0, skfem.ElementTetP1, skfem.ElementTetP2),
@@ -31,10 +31,12 @@ _ELEMENTS = {
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Quadrature points, q in each of m ``cells`` (m,): their ``places`` (m, q, 3) [mm] and ``weights`` (m, q) [mm3 or mm2], the
-    ``values`` (m, q, k) and ``slopes`` (m, q, 3, k) of k basis functions of the displacement, the values ``pressures`` (m, q, l)
-    of l basis functions of the pressure, and the numbers ``dofs`` (m, 3 k + l) of unknowns; on facets the outward unit ``normals``
-    (m, q, 3), and in a body with fibres their directions ``fibre`` (m, q, 3).
+    """The q quadrature points in, or on a facet of, each of m ``cells`` (m,).
+
+    ``places`` (m, q, 3) [mm]: positions. ``weights`` (m, q) [mm3, on facets mm2]. ``values`` (m, q, k), ``slopes`` (m, q, 3, k)
+    [1/mm]: the k basis functions of the displacement and their gradients. ``pressures`` (m, q, l): the l basis functions of the
+    pressure. ``dofs`` (m, 3 k + l): the indices of the unknowns. ``normals`` (m, q, 3): outward unit normals, on facets only.
+    ``fibre`` (m, q, 3): fibre directions, in a body with fibres.
     """
 
     cells: Ints
@@ -48,12 +50,12 @@ class Points:
     fibre: Floats | None = None
 
     def part(self, chosen: slice) -> "Points":
-        """The points of some of the cells."""
+        """The points in the ``chosen`` cells."""
         return replace(self, **{name: entry[chosen] for name, entry in vars(self).items() if entry is not None})
 
     @property
     def rates(self) -> Floats:
-        """The derivatives (m, q, 13, 3 k + l) of the variables at each point with respect to the unknowns of its cell."""
+        """The derivatives (m, q, 13, 3 k + l) of the variables at each point with respect to the unknowns of the cell."""
         m, q, k = self.values.shape
         rates = np.zeros((m, q, VARIABLES, 3 * k + self.pressures.shape[2]))
         for i in range(3):
@@ -63,7 +65,7 @@ class Points:
         return rates
 
     def variables(self, unknowns: Floats) -> Floats:
-        """The 13 variables at each point, (m, q, 13)."""
+        """The 13 variables (m, q, 13) at each point."""
         m, q, k = self.values.shape
         inside = unknowns[self.dofs]
         nodal = inside[:, : 3 * k].reshape(m, 1, k, 3)
@@ -74,10 +76,10 @@ class Points:
 
 
 class Space:
-    """The unknowns of an element of ``ELEMENTS`` on ``cells``."""
+    """The finite element space of an ``element``, named as in ``ELEMENTS``, on ``cells``."""
 
     def __init__(self, cells: Cells, element: str, degree: int) -> None:
-        """``degree``: the degree of polynomials that are integrated exactly on a straight cell."""
+        """``degree``: the degree of the polynomials that are integrated exactly on a straight cell."""
         kind, displacement, pressure = ELEMENTS[element]
         self.cells, self.degree = cells, degree
         self.nodal = _ELEMENTS[kind][displacement]()
@@ -87,8 +89,8 @@ class Space:
         self.mesh = _MESHES[kind][cells.degree - 1](cells.points.T.copy(), here.T.astype(np.int32))
         rule = get_quadrature(self.nodal.refdom, degree)
         self.basis = skfem.Basis(self.mesh, self.nodal, quadrature=rule)
-        self.rest: Floats = np.asarray(self.basis.doflocs.T)  # (N, 3) [mm], nodes of the displacement
-        self.nodes: Ints = np.empty(len(cells.points), np.int64)  # for each node of the mesh, its number in rest
+        self.rest: Floats = np.asarray(self.basis.doflocs.T)  # (N, 3) [mm], the nodes of the displacement
+        self.nodes: Ints = np.empty(len(cells.points), np.int64)  # the index in ``rest`` of each node of the mesh
         self.nodes[here] = self.basis.element_dofs[: here.shape[1]].T
         self.pressure = None
         if pressure is not None:
@@ -103,12 +105,12 @@ class Space:
 
     @cached_property
     def vertices(self) -> Points:
-        """The corners of all cells; their weights have no meaning."""
+        """The corners of all cells as points whose weights have no meaning."""
         corners = self.nodal.refdom.p
         return self._points(skfem.Basis, (corners, np.ones(corners.shape[1])))
 
     def facets(self, region: str) -> Ints:
-        """The facets of scikit-fem's mesh in ``region``; InputError if one of them does not belong to exactly one cell."""
+        """The indices of the facets in ``region``, in scikit-fem's mesh. Raises InputError unless each belongs to a single cell."""
         wanted = np.unique(np.sort(self.cells.facets[region], axis=1), axis=0)
         found = []
         for side, facets in zip(self.nodal.refdom.facets, self.mesh.t2f, strict=True):
@@ -120,7 +122,7 @@ class Space:
         return np.concatenate(found)
 
     def nodes_on(self, region: str) -> Ints:
-        """The nodes of the displacement on ``region``, each once."""
+        """The indices of the displacement nodes on ``region``, each once."""
         return np.unique(self.basis.get_dofs(self.facets(region)).all())
 
     def surface(self, region: str) -> Points:
@@ -129,7 +131,7 @@ class Space:
         return self._points(skfem.FacetBasis, rule, facets=self.facets(region))
 
     def _points(self, kind: Any, rule: tuple[Floats, Floats], **where: Ints) -> Points:
-        """The points of a quadrature ``rule`` for a ``kind`` of basis; ``where`` has the ``facets`` if the basis is on facets."""
+        """The points of a quadrature ``rule`` for a ``kind`` of basis; ``where`` contains ``facets`` for a basis on facets."""
         own, *others = (
             kind(self.mesh, basis.elem, quadrature=rule, dofs=basis.dofs, disable_doflocs=True, **where)
             for basis in (self.basis, self.pressure)

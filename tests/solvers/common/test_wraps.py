@@ -59,17 +59,20 @@ def test_what_is_deepest_inside_is_named(given) -> None:
     fixed[1, 1] = [11, 5, 16.5]
     name, message = wraps(given, BALL, RING).inside(fixed, 0)
     assert name == "obstacle[1]"
-    assert message.startswith("a fixed point of line 1 ")
+    assert message.endswith(" inside the obstacle (line 1)")
     assert wraps(given, BALL, RING).inside(FIXED, 0) == ("", "")
     fixed[1, 1] = [5, 5, 18]
-    assert wraps(given, BALL, RING).inside(fixed, 0) == ("obstacle[0]", "a fixed point of line 1 1 mm inside")
+    assert wraps(given, BALL, RING).inside(fixed, 0) == (
+        "obstacle[0]",
+        "a fixed point 1 mm inside the obstacle (line 1)",
+    )
 
 
 def test_what_an_obstacle_is_moved_to_is_inside(given) -> None:
     """A ball of 4 mm, 20 mm off the axis that its bone turns about: inside it is what its centre has come to, not where it was."""
     centre = apply(SWING.pose(10), np.array([[5.0, 5, 15]]))[0]
     fixed = np.array([[[5.0, 4, 0], centre]])
-    assert wraps(given, BALL).inside(fixed, 10) == ("obstacle[0]", "a fixed point of line 0 4 mm inside")
+    assert wraps(given, BALL).inside(fixed, 10) == ("obstacle[0]", "a fixed point 4 mm inside the obstacle (line 0)")
     assert wraps(given, BALL).inside(fixed, 0) == ("", "")
     assert wraps(given, BALL).inside(np.array([[[5.0, 4, 0], [5, 5, 15]]]), 10) == ("", "")
 
