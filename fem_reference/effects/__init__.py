@@ -117,7 +117,7 @@ class Energy(Effect):
     @classmethod
     def _check_region(cls, region: str) -> str:
         if "momentum" in cls.needs:
-            raise ValueError("no region, as the whole body has inertia")
+            raise ValueError("no region, as the entire body has inertia")
         return region
 
     def energy(self, state: State) -> Any:

@@ -1,4 +1,4 @@
-"""A tension along the fibres that does not depend on their stretch."""
+"""Active tension along the fibres, independent of their stretch."""
 
 from typing import Any, ClassVar
 

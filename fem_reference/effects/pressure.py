@@ -38,7 +38,7 @@ class Pressure(Ramped, Load):
         return None if found is None else Wrench(*(-self.pressure * one for one in found))
 
     def along(self, normals: Floats) -> Bools:
-        """True for the components of the normals that are not zero, up to rounding."""
+        """Mask (f, 3) of the components of the ``normals`` (f, 3) that are not 0, up to rounding."""
         return normals > _ROUNDED
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:

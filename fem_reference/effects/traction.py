@@ -33,7 +33,7 @@ class Traction(Ramped, Load):
         return dead(self.force, shape, self.on)
 
     def along(self, normals: Floats) -> Bools:
-        """True for each axis along which the force is not 0."""
+        """Mask (f, 3) of the axes along which the force is not 0."""
         return np.broadcast_to(np.array(self.force) != 0, normals.shape)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:  # noqa: ARG002

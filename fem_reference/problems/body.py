@@ -84,7 +84,7 @@ def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, 
     ]
     if element not in fitting:
         cells = f"{'curved ' if degree > 1 else ''}{kind} cells"
-        pressure = "with a pressure, which an effect brings" if brings else "without a pressure, which no effect brings"
+        pressure = "with a pressure, which an effect needs" if brings else "without a pressure, which no effect needs"
         raise InputError(place, f'"{element}"', f"an element for {cells} {pressure}: {', '.join(fitting)}")
 
 
@@ -94,7 +94,7 @@ def check_stiffness(effects: tuple[Effect, ...], place: str) -> None:
     for kind, modulus, law in (("shape", found.shear, "neo_hooke"), ("volume", found.bulk, "incompressible")):
         if not modulus > 0:
             got = f"effects that do not resist a change of {kind} at rest"
-            raise InputError(place, got, f'a law that does, such as "{law}", besides fibres and loads')
+            raise InputError(place, got, f'a law that resists it, such as "{law}", besides fibres and loads')
 
 
 def check_quadrature(element: str, degree: int | None, place: str) -> None:

@@ -72,7 +72,9 @@ class FibreEnds:
 
     def named(self, fibre: int, side: int) -> str:
         """A description of the end on a ``side`` (0 or 1) of a ``fibre``, for messages."""
-        how = "continued to {} by a tendon" if np.isfinite(self.tendons[fibre, side, 0]) else "which belongs to {}"
+        how = (
+            "which continues to {} as a tendon" if np.isfinite(self.tendons[fibre, side, 0]) else "which belongs to {}"
+        )
         return f"{SIDES[side]} end of fibre {fibre}, {how.format(self.attached[self.by[fibre, side]].attachment)}"
 
     @cached_property

@@ -133,7 +133,7 @@ class MuscleProblem(Setup):
         return tuple(bone for bone in self.bones if self.contact is not None and self.contact.is_by(bone.name))
 
     def write_meshes(self, folder: Path) -> None:
-        """Write surface, fibres and tetrahedra into ``folder``, for ParaView."""
+        """Write surface, fibres and tetrahedra for ParaView into ``folder``."""
         files.write_surface(folder / "surface.vtp", self.surface, self.surface.points)
         files.write_polylines(folder / "fibres.vtp", self.fibres, self.fibres.points)
         files.write_tets(folder / "tets.vtu", self.mesh, self.mesh.points)

@@ -107,7 +107,7 @@ class MusclesProblem:
 
     @cached_property
     def rest(self) -> AtRest:
-        """The rest state of everything whose positions a frame contains, muscle after muscle."""
+        """The rest state of everything whose positions a frame contains, in the order of the muscles."""
         found = list(self.problems.values())
         counts = np.concatenate([np.diff(one.fibres.offsets) for one in found])
         known = [one.directions for one in found]
@@ -125,7 +125,7 @@ class MusclesProblem:
         raise InputError("muscle", f"several ({', '.join(self.problems)})", "a case of one muscle")
 
     def write_meshes(self, folder: Path) -> None:
-        """Write surface, fibres and tetrahedra of each muscle into a folder with its name in ``folder``, for ParaView."""
+        """Write surface, fibres and tetrahedra for ParaView, in ``folder``, where each muscle has a folder with its name."""
         for name, one in self.problems.items():
             (folder / name).mkdir(exist_ok=True)
             one.write_meshes(folder / name)
@@ -220,7 +220,7 @@ def clearance(one: Setup, other: Setup) -> float:
 
 
 def _apart(one: Surface, other: Surface) -> float:
-    """The distance [mm] between two surfaces, from the vertices of each; 0 if they cross."""
+    """The distance [mm] between two surfaces, measured from the vertices of each to the other; 0 if they cross."""
     if len(crossings(one, other)):
         return 0.0
     found = [distances(a.points, b).distance.min() for a, b in ((one, other), (other, one))]

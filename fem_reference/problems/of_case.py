@@ -134,7 +134,7 @@ def _said(value: float | tuple[float, ...]) -> str:
 
 def _motion(motion: RigidMotion | None) -> str:
     if motion is None:
-        return "rests"
+        return "fixed"
     how, unit = f"slides along {_said(motion.axis)}", "mm"
     if motion.centre is not None:
         how, unit = f"rotates about {_said(motion.axis)} through {_said(motion.centre)} mm", "rad"

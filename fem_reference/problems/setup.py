@@ -164,7 +164,7 @@ def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
     for i, joint in enumerate(case.joint):
         bone, place = by_name[joint.bone], join(case.place, f"joint[{i}]")
         if bone.motion is None or bone.motion.centre is None:
-            got = f'the bone "{bone.name}", which {"rests" if bone.motion is None else "slides"}'
+            got = f'the bone "{bone.name}", which {"is fixed" if bone.motion is None else "slides"}'
             raise InputError(join(place, "bone"), got, "a bone that rotates, so that the joint has an angle")
         _check_axis(bone.motion, np.array(joint.axis), np.array(joint.centre), place)
         found.append(_joint(joint.name, bone, bone.motion, joint.axis, joint.centre))
@@ -187,4 +187,6 @@ def _check_axis(motion: RigidMotion, axis: Floats, centre: Floats, place: str) -
         want = f"the axis of the bone's motion, {motion.axis}, or its opposite"
         raise InputError(join(place, "axis"), str(tuple(axis.tolist())), want)
     if (off := float(np.linalg.norm(away - (away @ turns) * turns))) > _SAME_LINE:
-        raise InputError(join(place, "centre"), f"a point {off:.3g} mm off the axis of the bone's motion", "one on it")
+        raise InputError(
+            join(place, "centre"), f"a point {off:.3g} mm off the axis of the bone's motion", "a point on it"
+        )

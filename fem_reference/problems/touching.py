@@ -61,7 +61,7 @@ class Touching:
         return float(self.one == self.other) if self.relaxed is None else remaining(self.relaxed, frame)
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative with respect to the gap [MPa/mm]; NaN if the gap is NaN."""
+        """The pressure (n,) [MPa] at each ``gap`` (n,) [mm], and its derivative with respect to the gap; NaN if the gap is NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
 
 
@@ -100,7 +100,7 @@ def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[st
             raise InputError(f"touching[{i}]", got, "regions of separate pieces, or one region with itself")
         if law.one == law.other and moved:  # it is unknown which side was in front
             raise InputError(
-                "start", f'places, and "{law.one}" that touches itself', "none, as such contact begins at rest"
+                "start", f'positions, and "{law.one}" that touches itself', "none, as such contact begins at rest"
             )
     _check_pairs(touching, facets, piece)
 
@@ -119,5 +119,5 @@ def _check_pairs(touching: Sequence[Touching], facets: Mapping[str, Ints], piece
             if all(shared) or (
                 skins and all(len(np.intersect1d(piece[facets[a]], piece[facets[b]])) for a, b in sides)
             ):
-                got = f'"{other.one}" and "{other.other}" with facets that touch under touching[{i}], too'
+                got = f'"{other.one}" and "{other.other}" with facets that also touch under touching[{i}]'
                 raise InputError(f"touching[{j}]", got, "one law for a pair of facets")

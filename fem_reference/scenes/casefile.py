@@ -251,9 +251,7 @@ def _check_muscles(case: MusclesCase) -> None:
     if case.expect:
         raise InputError(join(case.place, "expect"), "expectations of all muscles", "muscle[i].expect, for each muscle")
     if in_situ.among(case.effects) is not None:
-        raise InputError(
-            join(case.place, "effect"), '"in_situ" with several muscles', "muscles that rest without stress"
-        )
+        raise InputError(join(case.place, "effect"), '"in_situ" with several muscles', "muscles without stress at rest")
     runs = ["reference", "candidates", *(candidate.name for candidate in case.candidate)]
     for i, muscle in enumerate(case.muscle):
         used = [(f"muscle[{i}].expect[{k}].of", entry.of) for k, entry in enumerate(muscle.expect)]

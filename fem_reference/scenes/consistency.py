@@ -51,7 +51,7 @@ def _check_forces(case: MuscleCase) -> None:
     for i, attachment in enumerate(case.attachment):
         if contact and attachment.name in bones:
             place = join(case.place, f"attachment[{i}].name")
-            raise InputError(place, f'"{attachment.name}", which a bone in contact has too', "a different name")
+            raise InputError(place, f'"{attachment.name}", which is also the name of a bone', "a different name")
     stays = any(isinstance(effect, Damping) or "momentum" in effect.needs for effect in case.effects)
     if not case.attachment and not stays:
         want = 'an attachment, however soft, or the effect "damping" or "inertia": otherwise the muscle drifts'

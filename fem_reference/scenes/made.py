@@ -25,7 +25,7 @@ def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "c
     the expected value.
     """
     if not isinstance(table, Mapping) or not all(isinstance(key, str) for key in table):
-        raise InputError("case", said(table), "keys and tables, as a case.toml has them")
+        raise InputError("case", said(table), "keys and tables as in a case.toml")
     given, place = dict(table), path(folder, "folder").resolve()
     if "domain" not in given:
         given = _with_units(MuscleCase, given)

@@ -114,7 +114,7 @@ def _field(case: Case, key: str) -> Any:
     number(case, key)
     owner, name = _along(case, key)[-2], parts(key)[-1]
     if not isinstance(owner, Record):
-        raise InputError(join(case.place, key), "a number of a list", "the key of a number with a name")
+        raise InputError(join(case.place, key), "a number in a list", "the key of a number with a name")
     return type(owner).model_fields[str(name)]
 
 

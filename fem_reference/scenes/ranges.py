@@ -53,7 +53,7 @@ def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, flo
     if not low < high:
         raise InputError(f"{place}.high", f'"{one.high}"', f'more than low, "{one.low}"')
     if one.spread == "log-uniform" and not low > 0:
-        raise InputError(f"{place}.low", f'"{one.low}"', "more than zero, for a range of logarithms")
+        raise InputError(f"{place}.low", f'"{one.low}"', "more than zero, for a log-uniform range")
     if one.spread == "log-uniform" and not (own := numbers.number(case, key)) > 0:
         raise InputError(f"{place}.spread", f'"log-uniform" of {own:g}', '"uniform", as this number has no logarithm')
     return low, high
