@@ -153,8 +153,8 @@ def _longest_side(surface: Surface) -> float:
 
 
 def fan(points: Floats) -> Surface:
-    """A fan of triangles from the centroid of ``points`` (n, 3) to each two successive points, sorted by angle in the best-fit
-    plane.
+    """A fan of triangles between the centroid of ``points`` (n, 3) and each two neighbouring points. Neighbours follow each other
+    in the order of their angles in the best-fit plane.
     """
     centre = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - centre)

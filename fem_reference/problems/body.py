@@ -159,7 +159,7 @@ class Prescribed:
     anchor: tuple[float, float, float] | None = None
 
     def displacements(self, points: Floats, frame: float) -> Floats:
-        """The displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components. Raises InputError if the path fails."""
+        """The displacements (n, 3) [mm] of ``points`` (n, 3), 0 along axes without prescription. InputError if the path fails."""
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:
             found = np.asarray(self.path(np.array(points), frame))
@@ -260,8 +260,9 @@ class Body:
         return diagonal(self.mesh.points)
 
     def shares(self, points: Floats, cells: Ints) -> dict[str, Floats]:
-        """The shares (n,) of points in each region that an effect names, by region. ``points`` (n, 3) [mm]: rest positions in
-        ``cells`` (n,).
+        """The shares (n,) of points in each region that an effect names, by the name of the region.
+
+        ``points`` (n, 3) [mm]: the rest positions of the points; ``cells`` (n,): the cells in which they are.
         """
         found = {name: self.regions[name](points) for name in regions_named(self.effects)}
         for name in set(found) & set(self.within):

@@ -26,7 +26,9 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class ContactBone:
-    """A bone in contact. ``shape``: its distance function at rest; ``pose``: from frame number to 4 x 4 matrix; both picklable."""
+    """A bone in contact. ``shape``: its distance function at rest; ``pose``: a function from a frame number to a 4 x 4 matrix. Both
+    must be picklable.
+    """
 
     name: str
     shape: Obstacle

@@ -37,8 +37,8 @@ _FELT = 1.0  # a distance [mm] from a bone that exceeds any smoothing of contact
 class Decision:
     """The decision whether an ``effect`` is ``needed``. ``indicator``: the estimates for the effect, None for a part of the
     material; ``bound`` [mm], ``stress_bound`` [MPa]: their allowed values. ``turned_out``: the frame whose solution showed that the
-    effect is needed, None if estimates showed it. ``listed``: True if the effect acts in any case. ``of``: the muscle in which the
-    effect acts if it acts in only one of several.
+    effect is needed, None if estimates showed it. ``listed``: True if the effect acts whether it is needed or not. ``of``: the name
+    of the muscle if the effect acts in only one of several muscles, otherwise empty.
     """
 
     effect: Effect

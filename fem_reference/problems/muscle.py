@@ -89,7 +89,7 @@ class MuscleProblem(Setup):
 
     @property
     def muscle(self) -> "MuscleProblem":
-        """The problem of the single muscle: this problem."""
+        """This problem, which has a single muscle."""
         return self
 
     @property
@@ -286,7 +286,7 @@ def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str
 
 
 def _among_bones(body: Body, bones: tuple[Bone, ...], skin: Skin, effect: ContactEffect) -> Body:
-    """The body in contact with ``bones``. An overlap at rest is removed before the first frame, unless there is tension at rest."""
+    """A copy of ``body`` in contact with ``bones``. An overlap at rest is removed before the first frame, except under tension."""
     pressing = [bone for bone in bones if effect.is_by(bone.name)]
     first, points = body.frames[0], skin.points
     nearest = min((nearest_at_rest(bone.name, bone.shape, points) for bone in pressing), default=np.inf)

@@ -54,7 +54,7 @@ def at_frames(built: MechanicalProblem, frames: tuple[int, ...]) -> MechanicalPr
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
-    """The decision, with a reason, whether a case needs each of its effects; empty for a scalar field.
+    """The decisions, with reasons, on the effects that a case needs; empty for a scalar field.
 
     ``rest``: a function that returns the set-up of the case; if it is None, the set-up is made here.
     """
@@ -188,7 +188,7 @@ def watch(case: Case, rest: CaseSetup, built: Callable[[], CaseProblem]) -> Watc
 
 
 def with_effects[C: Case](case: C, found: tuple[Decision, ...]) -> C:
-    """A copy of the case with its needed effects, once the decisions ``found`` replace the earlier ones on the same effects."""
+    """A copy of the case with only the needed effects. The decisions ``found`` replace earlier decisions on the same effects."""
     for one in found:
         log.info("%s: %s", case.name, one)
     new = {id(one.effect): one for one in found}

@@ -80,8 +80,8 @@ def facts(rest: Setup) -> dict[str, str]:
 
 
 def check(body: Body) -> None:
-    """Raise InputError if an effect acts in a region that does not exist or has almost no points, if shares are not from 0 to 1, or
-    if a part of the body lacks an isochoric law, a volumetric law, or a law for the pressure unknown.
+    """Raise InputError if an effect acts in a region that does not exist or whose share is below 0.25 everywhere, if shares are not
+    from 0 to 1, or if a part of the body lacks an isochoric law, a volumetric law, or a law for the pressure unknown.
     """
     named = {i: region for i, effect in enumerate(body.effects) if (region := region_of(effect))}
     for i, region in named.items():
@@ -113,7 +113,7 @@ def check(body: Body) -> None:
 
 def _check_whole(kind: str, laws: list[Energy], at: State, points: Floats) -> None:
     """Raise InputError unless the shares of all ``laws`` of a ``kind`` sum to at least 0.5 at each of ``points`` (n, 3), and to 1
-    for laws with a pressure unknown. ``at``: the state with the shares at these points.
+    for laws with a pressure unknown. ``at``: the state with the shares at these points. Without laws nothing is checked.
     """
     total = np.zeros(len(points)) + sum(at.share(law.region) for law in laws)
     off = np.abs(total - 1) - _ROUNDED if kind == "pressure" else _LEAST - total

@@ -60,7 +60,7 @@ class FieldProblem:
 
     @property
     def field(self) -> "FieldProblem":
-        """The problem of the scalar field: this problem."""
+        """This problem, which is a scalar field."""
         return self
 
     def write_meshes(self, folder: Path) -> None:

@@ -129,7 +129,7 @@ class Case(Record):
         return ()
 
     def expecting(self, more: tuple[Expectation, ...]) -> Self:
-        """A copy of the case with ``more`` expectations."""
+        """A copy of the case to which the expectations ``more`` are added."""
         return self.model_copy(update={"expect": (*self.expect, *more)})
 
     @property
@@ -256,9 +256,7 @@ def _unnamed(tables: Any, names: Collection[str]) -> Any:
 
 
 def _files(tables: Any, names: Collection[str], key: str = "") -> Iterator[tuple[str, str]]:
-    """The key and the name of each file in ``tables``. ``names``: the keys whose values are file names; ``key``: that of
-    ``tables``.
-    """
+    """The key and the name of each file in ``tables``. ``names``: the keys of file names; ``key``: the key of ``tables`` itself."""
     if isinstance(tables, list):
         for i, value in enumerate(tables):
             yield from _files(value, names, f"{key}[{i}]")

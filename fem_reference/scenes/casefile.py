@@ -162,7 +162,7 @@ def _scene(table: dict[str, Any], path: Path) -> Case:
 
 
 def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
-    """The checked case with the keys of ``table``. ``whose``: its ``name``, ``folder``, ``place`` and, if True, ``from_file``."""
+    """The checked case with the keys of ``table``. ``whose``: ``name``, ``folder`` and ``place``, and ``from_file`` for a file."""
     place = str(whose["place"])
     table = alone(table, place)
     record: type[Case]

@@ -21,8 +21,7 @@ class PolylineFile(Record):
 
 
 class Traced(Record):
-    """A number (``count``) of fibres, traced along the gradient of a Laplace field from the attachment ``start`` to the attachment
-    ``end``.
+    """Fibres traced along the gradient of a Laplace field from the attachment ``start`` to ``end``. ``count``: the number of fibres.
 
     With ``flux = "area"`` the flux per unit area is constant over each attachment, and fibres cover both attachments. Without it,
     the field is 0 on ``start`` and 1 on ``end``, and fibres are concentrated at the rims of wide attachments.
@@ -35,11 +34,11 @@ class Traced(Record):
 
 
 class KohoutKukacka(Record):
-    """A number (``count``) of fibres of a ``template`` in the unit cube, mapped into the muscle.
+    """Fibres of a ``template`` in the unit cube, mapped into the muscle. ``count``: the number of fibres.
 
     The map uses a number of ``contours`` of the Laplace field between the attachments ``start`` and ``end``. The fibres of the
-    template "pennate" are inclined to the line of the muscle by the angle ``pennation``, towards the side of the muscle to which
-    the vector ``towards`` points.
+    template "pennate" are inclined by the angle ``pennation`` to the direction along the muscle, towards the side of the muscle to
+    which the vector ``towards`` points.
     """
 
     count: int = Field(gt=0, le=10_000)
@@ -61,7 +60,7 @@ class KohoutKukacka(Record):
 
 
 class Chmd(Record):
-    """A number (``count``) of fibres, interpolated between fibres on the surface of the muscle.
+    """Fibres interpolated between fibres on the surface of the muscle. ``count``: the number of fibres.
 
     ``heads``: a file for each head of the muscle, with three or more fibres around the head. ``around``: instead of files, fibres
     that are traced along a Laplace field just below the surface.

@@ -75,7 +75,7 @@ class CaseHalfSpace(Record):
 
 
 class CaseBox(Record):
-    """A box along the axes with a ``centre`` and outer edge lengths ``size``; ``rounding``: the radius of its edges and corners."""
+    """An axis-aligned box with a ``centre`` and outer edge lengths ``size``. ``rounding``: the radius of edges and corners."""
 
     centre: Point
     size: Point
@@ -145,7 +145,7 @@ class CaseBone(Record):
 
 
 class CaseJoint(Record):
-    """A joint in which a ``bone`` rotates about an ``axis`` through ``centre``. The angle is right-handed, 0 at the first frame."""
+    """A joint in which a ``bone`` rotates about an ``axis`` through ``centre``. Its right-handed angle is 0 at the first frame."""
 
     name: Name
     bone: str

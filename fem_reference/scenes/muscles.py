@@ -93,7 +93,7 @@ class MusclesCase(DrivenCase):
         return [self.determining(), *super(MusclesCase, judged).decides[1:]]
 
     def expecting(self, more: tuple[Expectation, ...]) -> Self:
-        """A copy of the case with ``more`` expectations of each muscle."""
+        """A copy of the case in which the expectations ``more`` are added to each muscle."""
         muscles = (one.model_copy(update={"expect": (*one.expect, *more)}) for one in self.muscle)
         return self.model_copy(update={"muscle": tuple(muscles)})
 
@@ -144,9 +144,7 @@ def muscles_of(case: DrivenCase) -> tuple[Muscle, ...]:
 
 
 def with_muscles[C: DrivenCase](case: C, change: Callable[[Muscle], Mapping[str, object]]) -> C:
-    """A copy of the case with changes to each of its muscles. ``change``: a function of a muscle that returns its new values by
-    key.
-    """
+    """A copy of the case with changes to each of its muscles. ``change``: a function from a muscle to its new values by key."""
     changed = [one.model_copy(update=change(one)) for one in muscles_of(case)]
     return case.model_copy(update={"muscle": tuple(changed) if isinstance(case.muscle, tuple) else changed[0]})
 
