@@ -210,9 +210,7 @@ class Prestrain(Effect):
 
 
 def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
-    """The ``state`` with the F on which energies depend: the elastic part, if an effect of ``acting`` (with amounts) is a
-    prestrain.
-    """
+    """The ``state`` with the F on which energies depend: its elastic part if ``acting``, pairs (effect, amount), prestrain it."""
     for effect, amount in acting:
         if isinstance(effect, Prestrain):
             now, before = (effect.elastic(replace(state, F=F, amount=amount)) for F in (state.F, state.F_before))

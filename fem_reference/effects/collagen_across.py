@@ -8,8 +8,7 @@ from pydantic import Field
 from fem_reference.effects import Energy, Moduli, State
 from fem_reference.foundations.units import PositivePressure
 
-# The cosines of twice the angle, which is spread evenly from 0 to pi. Python floats, as numpy floats would turn symbols into
-# arrays.
+# Cosines of twice the angle, spread evenly from 0 to pi; Python floats, because numpy floats would turn symbols into arrays.
 _DIRECTIONS = 8
 COSINES = [float(np.cos((j + 0.5) * np.pi / _DIRECTIONS)) for j in range(_DIRECTIONS)]
 # The square root has no derivative at 0, so this fraction of the squared mean is added to the squared spread.

@@ -10,7 +10,7 @@ from fem_reference.effects import Effect, Prestrain, State, moduli
 
 class InSitu(Prestrain):
     """The energies depend on ``F Fp`` with ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``, where l is the ``stretch`` along the fibre f. A
-    stress at rest balances all effects at the first frame, including an activation, so that ``F = 1`` is in equilibrium there.
+    stress at rest balances all effects at the first frame, including any activation, so that ``F = 1`` is in equilibrium there.
 
     The energy of this stress per unit rest volume is ``2 mu dev(e) : E + p0 (J - 1)`` with ``E = (F^T F - 1) / 2`` and fixed fields
     ``e`` and ``p0``, so that the stress rotates with the body. ``e`` and ``p0`` are the strain and the pressure of an isotropic

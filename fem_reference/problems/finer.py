@@ -120,9 +120,7 @@ def _facets(mesh: Cells, names: Ints, shares: Ints) -> dict[str, Ints]:
 
 
 def _in_parts(skin: Skin, mesh: Cells) -> Skin:
-    """The ``skin`` with each of its points assigned to the nearest part of its cell, by barycentric coordinates in straight
-    tetrahedra.
-    """
+    """The ``skin`` with each point in the nearest part of its cell, found by barycentric coordinates in straight tetrahedra."""
     corners = mesh.points[mesh.cells[skin.cells, :4]]
     places, parts = barycentric(skin.points, corners)[:, 1:], _parts("tetrahedron")
     inside = np.linalg.solve(edge_vectors(parts)[None], (places[:, None] - parts[None, :, 0])[..., None])

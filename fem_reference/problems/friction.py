@@ -22,9 +22,9 @@ def check(coefficients: Iterable[float | None], *, begun: bool) -> None:
 
 
 class Returned(NamedTuple):
-    """The secant stiffness of friction at n points. ``stiffness`` (n,) [MPa/mm]: the traction divided by the elastic slip;
-    ``by_slip`` (n,), ``by_limit`` (n,): its derivatives with respect to the length of the elastic slip and to the limit of the
-    traction.
+    """The secant stiffness of friction at n points. ``stiffness`` (n,) [MPa/mm]: the traction divided by the elastic slip.
+    ``by_slip`` (n,), ``by_limit`` (n,): the derivatives of ``stiffness`` with respect to the length of the elastic slip and to the
+    limit of the traction.
     """
 
     stiffness: Floats

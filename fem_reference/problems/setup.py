@@ -149,8 +149,7 @@ class Setup:
 
 
 def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
-    """The joints of a case. If the case states none, there is a joint for each rotating bone, with its name and its axis of
-    rotation.
+    """The joints of a case. If the case states none, each rotating bone has a joint with the bone's name and axis of rotation.
 
     Raises InputError if a bone does not rotate about the axis of its joint, because the joint would have no angle.
     """

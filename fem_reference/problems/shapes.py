@@ -107,8 +107,7 @@ def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: in
     """A box with a corner at the origin, faces x0, x1, y0, y1, z0, z1, and edges of lengths ``size`` [mm] along x, y, z.
 
     ``counts``: the numbers of cells along x, y, z; with tetrahedra, each of these cells is cut into six. ``kind``:
-    ``"tetrahedron"`` or ``"hexahedron"``. ``degree``: 1 for straight cells, 2 for cells with additional nodes, such as midpoints of
-    edges.
+    ``"tetrahedron"`` or ``"hexahedron"``. ``degree``: 1 for straight cells, 2 for cells with nodes on their edges too.
     """
     check_box(counts, size, kind, degree)
     return mapped([Brick(lambda unit: unit * size, counts, _SIX)], kind, degree)

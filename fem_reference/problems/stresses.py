@@ -30,9 +30,8 @@ _SMALLEST = 0.05  # the minimum det F of sampled tetrahedra: curved tetrahedra m
 
 
 def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float = 0.0) -> Floats:
-    """The first Piola-Kirchhoff stress ``dW/dF`` (count, 3, 3) [MPa] at a ``state`` whose F consists of jets. W is the sum of the
-    energies per unit rest volume of the effects ``acting``, pairs (effect, amount), and of the energy ``at_rest`` of a stress at
-    rest.
+    """The first Piola-Kirchhoff stress ``dW/dF`` (count, 3, 3) [MPa] at a ``state`` whose F consists of jets. W is the energy per
+    unit rest volume of the effects ``acting``, pairs (effect, amount), plus the energy ``at_rest`` of a stress at rest.
     """
     energy = total_energy(acting, state) + at_rest
     slope = energy.slope if isinstance(energy, Jet) else np.zeros((9, 1))
@@ -132,9 +131,8 @@ class Watch:
     """A watch on the influence that the omitted effects of a ``case`` would have on the frames of a run, as these are solved.
 
     The stresses of omitted and of acting effects follow from a solved state without another solution. They are compared with the
-    stress of the acting effects: during a run, the maximum of the ``known`` estimate and the stresses so far; at the end, the
-    maximum of all stresses. ``frames``: for each frame, the surface (n, 3) and the stresses in the tetrahedra, None without
-    tetrahedra.
+    stress of the acting effects: during a run, with the maximum of the ``known`` estimate and the stresses so far; at the end, with
+    the maximum of all stresses. ``frames``: the surface (n, 3) of each frame, and the stresses in its tetrahedra, None without any.
     """
 
     def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:

@@ -21,7 +21,7 @@ class PolylineFile(Record):
 
 
 class Traced(Record):
-    """Fibres traced along the gradient of a Laplace field from the attachment ``start`` to ``end``. ``count``: the number of fibres.
+    """``count`` fibres, traced along the gradient of a Laplace field from the attachment ``start`` to the attachment ``end``.
 
     With ``flux = "area"`` the flux per unit area is constant over each attachment, and fibres cover both attachments. Without it,
     the field is 0 on ``start`` and 1 on ``end``, and fibres are concentrated at the rims of wide attachments.

@@ -15,14 +15,13 @@ from fem_reference.scenes.muscle import MuscleCase
 
 
 def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "case") -> Case:
-    """Make a case from a ``table`` with the keys of a ``case.toml``, without a file. ``cases/hip_flexion/case.toml`` explains the
-    keys.
+    """Make a case from a ``table`` with the keys of a ``case.toml``, but without a file.
 
     A table with a ``domain`` is the case of a scalar field; any other table is the case of a muscle. A quantity is text with a
     unit, or a number in mm, N, MPa, s, rad and tonne. An effect is a table or a result of :func:`fem_reference.make_effect`. The
     keys ``candidate``, ``expect`` and ``negative_control`` are optional. File names are relative to ``folder``. ``name``: the name
     of the case on pages. Raises InputError if a key is missing, unknown or invalid; the message names the key, the given value and
-    the expected value.
+    the expected value. ``cases/hip_flexion/case.toml`` explains each key.
     """
     if not isinstance(table, Mapping) or not all(isinstance(key, str) for key in table):
         raise InputError("case", said(table), "keys and tables as in a case.toml")

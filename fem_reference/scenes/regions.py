@@ -58,11 +58,10 @@ class ShareOfField(Record):
 
 
 class CaseRegion(Record):
-    """A part of the muscle at rest, given by exactly one of ``attachment``, ``patch``, ``surface``, ``tets`` and ``field``. An
-    effect acts in a region if its key ``in`` has the ``name`` of the region.
+    """A part of the muscle at rest, given by exactly one of ``attachment``, ``patch``, ``surface``, ``tets`` and ``field``.
 
-    The weight of the region (the share of a point) grows from 0 at the border to 1 at a depth of ``width``. Regions with the same
-    name are united.
+    An effect acts in a region if its key ``in`` names the region. At each point the effect is weighted by the share of the point in
+    the region, which grows from 0 at the border to 1 at a depth of ``width``. Regions with the same name are united.
     """
 
     name: Name

@@ -121,9 +121,7 @@ class ScalarCase(Case):
         return (0,)
 
     def standards(self, of: str) -> frozenset[Standard]:
-        """The standards against which a run is measured. ``of``: the name of a candidate, or ``"reference"``. A field has no rest
-        state.
-        """
+        """The standards against which a run is measured, for a field, which has no rest state; ``of``: as in ``Case.standards``."""
         found: set[Standard] = {"itself"}
         if self.exact is not None:
             found.add("exact")
