@@ -1,13 +1,13 @@
-"""Effects: one file each, named as in scene files. A problem sums its effects and adds nothing else.
+"""Effects: each has a file of its own, whose name is used in scene files. A problem is the sum of its effects and nothing else.
 
-Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters, with one expression, written only
-with operators and the functions of ``Functions``. So a solver can use the expression symbolically, and a test can evaluate it in
-numpy. An ``Effect`` of a body is an ``Energy`` per unit rest volume, a ``Load`` on a part of its surface (a traction, or an energy
-per unit rest area), a ``Prestrain``, which changes the deformation on which the energies depend, or an ``Interaction``, whose
-expression belongs to a problem. A ``FieldEffect`` acts on a scalar field psi and has a weak form.
+Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters with one expression, written only
+with operators and the functions of ``Functions``. A solver can therefore use the expression symbolically, and a test can evaluate
+it in numpy. An ``Effect`` acts on a body. It is an ``Energy`` per unit rest volume; a ``Load`` on a part of the surface (a
+traction, or an energy per unit rest area); a ``Prestrain``, which changes the deformation on which the energies depend; or an
+``Interaction``, which is formulated by a problem. A ``FieldEffect`` acts on a scalar field psi and has a weak form.
 
-A solver may replace the parameters of an effect by symbols, so that one compiled form serves all their values. Therefore an
-expression never branches on a parameter, and applies only operators and ``state.functions`` to parameters.
+A solver may replace the parameters of an effect by symbols, so that one compiled form serves for all values. An expression must
+therefore never branch on a parameter, and must apply only operators and ``state.functions`` to parameters.
 """
 
 import importlib
@@ -38,11 +38,11 @@ __path__ += outside.folders()
 class Effect(Record):
     """A frozen record of the parameters of an effect on a body.
 
-    ``unknowns``: names of the fields that it adds. ``needs``: its requirements, among ``"fibre"`` (fibre directions at rest),
-    ``"interval"`` (the time between frame numbers) and ``"momentum"`` (velocities, and displacements predicted for a load step).
-    ``outer``: True if the effect acts from outside the body, so its forces do not sum to zero. ``example``: some of its parameters
-    as in scene files, without those of its base class. ``published``: the ranges of its parameters in the literature on muscle, by
-    name.
+    ``unknowns``: the names of the fields that the effect adds. ``needs``: its requirements, among ``"fibre"`` (fibre directions at
+    rest), ``"interval"`` (the time between frame numbers) and ``"momentum"`` (velocities, and displacements predicted for a load
+    step). ``outer``: True if the effect acts from outside the body, so that its forces need not sum to zero. ``example``: example
+    values of its parameters as in scene files, without those of the base classes. ``published``: the ranges of parameters in the
+    literature on muscle, by name.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ()
@@ -52,30 +52,30 @@ class Effect(Record):
     published: ClassVar[dict[str, Range]] = {}
 
     def amount(self, frame: float) -> float:  # noqa: ARG002
-        """The amount of the effect at a frame: 1, unless it has a ramp."""
+        """The amount of the effect at a frame: 1 unless the effect has a ramp."""
         return 1.0
 
     def limits(self) -> tuple[Limit, ...]:
-        """The ranges in which the effect is valid; empty unless its docstring states a range."""
+        """The ranges in which the effect is valid; empty if its docstring states none."""
         return ()
 
     def moduli(self) -> Moduli:
-        """The stiffness of the body at rest due to the effect."""
+        """The contribution of the effect to the stiffness of the body at rest."""
         return Moduli()
 
     def resultant(self, shape: Shape) -> Wrench | None:  # noqa: ARG002
-        """The force and moment of the full amount on an entire body of this ``shape``; None if they are unknown or depend on more
-        than the shape, such as velocities within a load step.
+        """The force and moment of the effect on an entire body of this ``shape``, for an amount of 1. None if they are unknown, or
+        depend on more than the shape, such as velocities within a load step.
         """
         return None if self.outer else Wrench(np.zeros(3), np.zeros(3))
 
     def indicator(self, scene: Estimates) -> Indicator | None:  # noqa: ARG002
-        """The evidence, before solving, that a scene needs the effect; None for a part of the material, which is always needed."""
+        """An estimate, before solving, of the influence of the effect; None for a part of the material that is always needed."""
         return None
 
     @property
     def title(self) -> str:
-        """The name of the effect, with its part of the surface and its region, as a scene may have several effects of a kind."""
+        """The name of the class with the part of the surface and the region, as a scene may have several effects of one class."""
         on = getattr(self, "on", "")
         return (
             type(self).__name__ + (f" on {on}" if on else "") + (f" in {region}" if (region := region_of(self)) else "")
@@ -83,13 +83,13 @@ class Effect(Record):
 
     @property
     def parameters(self) -> list[tuple[str, Any, str]]:
-        """Name, value and unit of each parameter."""
+        """The name, value and unit of each parameter except the region."""
         fields = type(self).model_fields.items()
         return [(name, getattr(self, name), unit_of(entry.metadata)) for name, entry in fields if name != "region"]
 
 
 class Ramped(Effect):
-    """An effect with a ramp: ``ramp`` gives the amount of the effect, linear between knots and constant beyond them."""
+    """An effect with a ``ramp``: its amount varies over the frames, linearly between knots, and is constant beyond them."""
 
     example: ClassVar[dict[str, Any]] = {"ramp": [{"frame": 0, "amount": 0.0}, {"frame": 10, "amount": 1.0}]}
     ramp: tuple[RampPoint, ...] = Field(min_length=1)
@@ -106,8 +106,8 @@ class Ramped(Effect):
 
 
 class Energy(Effect):
-    """An effect with an energy per unit rest volume; ``stored``: True if the energy is recoverable. The effect acts everywhere, or
-    in a ``region`` of the body (``in``) in proportion to the share of a point in the region.
+    """An effect with an energy per unit rest volume. ``stored``: True if the energy is recoverable. ``region`` (the key ``in``):
+    the region of the body in which the effect acts, weighted by the share of each point; empty if the effect acts everywhere.
     """
 
     stored: ClassVar[bool] = True
@@ -117,7 +117,7 @@ class Energy(Effect):
     @classmethod
     def _check_region(cls, region: str) -> str:
         if "momentum" in cls.needs:
-            raise ValueError("no region, as the whole body has inertia")
+            raise ValueError("no region, as the entire body has inertia")
         return region
 
     def energy(self, state: State) -> Any:
@@ -130,18 +130,18 @@ class Energy(Effect):
 
 
 def region_of(effect: Record) -> str:
-    """The region in which an ``effect`` acts, as ``State.share`` reads it."""
+    """The region in which an ``effect`` acts, in the form that ``State.share`` accepts; empty if it acts everywhere."""
     return str(getattr(effect, "region", ""))
 
 
 def regions_named(effects: Iterable[Record]) -> list[str]:
-    """The names of the regions inside or outside of which ``effects`` act, each once."""
+    """The names, each once, of the regions inside which or outside which ``effects`` act."""
     named = filter(None, map(region_of, effects))
     return list(dict.fromkeys(region.removeprefix(REST) for region in named))
 
 
 class VolumeLaw(Energy):
-    """An energy that depends on the volume alone, with the bulk modulus ``bulk`` [MPa]; valid for V/V0 from 1/2 to 2."""
+    """An energy that depends only on the volume, with the bulk modulus ``bulk`` [MPa]. Valid for V/V0 from 1/2 to 2."""
 
     example: ClassVar[dict[str, Any]] = {"bulk": "10 MPa"}
     bulk: PositivePressure
@@ -154,7 +154,7 @@ class VolumeLaw(Energy):
 
 
 class LameLaw(Energy):
-    """An isotropic energy with Lame's parameters at rest, ``mu`` and ``lame`` [MPa]."""
+    """An isotropic energy. ``mu``, ``lame``: the Lame parameters at rest [MPa]."""
 
     example: ClassVar[dict[str, Any]] = {"mu": "10 kPa", "lame": "90 kPa"}
     mu: PositivePressure
@@ -170,14 +170,14 @@ class PassiveFibres(Energy):
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The tension of the fibres at the maximum expected stretch, compared with the stiffness of the matrix."""
+        """The tension of the fibres at the maximum expected stretch, relative to the stiffness of the matrix."""
         greatest = scene.stretch[1]
         pull = fibre_tension(self.energy, greatest)
         return fibre_indicator(scene, pull, scene.shorten(pull, 0.1 * (greatest - 1)))
 
 
 class Load(Effect):
-    """A load on the part ``on`` of the surface. If ``stored``, the load has an energy per unit rest area, otherwise a traction."""
+    """A load on the part ``on`` of the surface: an energy per unit rest area if ``stored`` is True, otherwise a traction."""
 
     outer: ClassVar[bool] = True
     stored: ClassVar[bool] = False
@@ -185,7 +185,7 @@ class Load(Effect):
     on: str
 
     def along(self, normals: Floats) -> Bools:
-        """True (f, 3) for the axes along which the load may act on facets, from the magnitudes of their ``normals`` (f, 3)."""
+        """Mask (f, 3) of the axes along which the load may act on facets; ``normals`` (f, 3): absolute components of normals."""
         return np.ones(normals.shape, bool)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
@@ -198,7 +198,7 @@ class Load(Effect):
 
 
 class Interaction(Effect):
-    """An effect between a body and the bones or muscles around it, which a problem formulates."""
+    """An effect between a body and the bones or muscles around it. Its equations are part of a problem."""
 
 
 class Prestrain(Effect):
@@ -210,7 +210,7 @@ class Prestrain(Effect):
 
 
 def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
-    """``state`` with the F on which the energies of ``acting`` depend: its elastic part, if there is a prestrain."""
+    """The ``state`` with the F on which energies depend: its elastic part if ``acting``, pairs (effect, amount), prestrain it."""
     for effect, amount in acting:
         if isinstance(effect, Prestrain):
             now, before = (effect.elastic(replace(state, F=F, amount=amount)) for F in (state.F, state.F_before))
@@ -219,8 +219,8 @@ def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
 
 
 def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
-    """The sum of the energies per unit rest volume [MPa] of ``acting`` (effect, amount) pairs at ``state``, whose F is the total
-    deformation gradient. A prestrain changes the F before the step and the present F in the same way, so its ramp causes no rate.
+    """The sum of the energies per unit rest volume [MPa] of ``acting``, pairs (effect, amount), at a ``state`` whose F is the total
+    deformation gradient. A prestrain changes the F before the step and the present F alike, so its ramp causes no rate of strain.
     """
     state = elastic_state(acting, state)
     return sum(law.weighted(replace(state, amount=amount)) for law, amount in acting if isinstance(law, Energy))
@@ -232,57 +232,59 @@ def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator
 
 
 class FieldEffect(Record):
-    """A frozen record of parameters with a term of ``-div(k grad psi) + v . grad psi + c psi - f = 0`` (report eq. 4.4, whose
-    A, B, C and D f are -k, v, c and f). ``example``: some of its parameters, as scene files write them.
+    """A frozen record of the parameters of a term in ``-div(k grad psi) + v . grad psi + c psi - f = 0`` (report eq. 4.4, whose A,
+    B, C and D f are -k, v, c and f). ``example``: example values of its parameters, as in scene files.
     """
 
     example: ClassVar[dict[str, Any]] = {}
 
     def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:
-        """The term times ``test``, integrated by parts where it has second derivatives; linear in ``test``, affine in ``psi``."""
+        """The term times ``test``, integrated by parts if it has second derivatives: linear in ``test`` and affine in ``psi``."""
         return self.strong(psi, place) * test.value
 
     def strong(self, psi: FieldState, place: Place) -> Any:
-        """The term in its strong form, as residual-based stabilisation needs it."""
+        """The term in its strong form, which residual-based stabilisation needs."""
         raise NotImplementedError(f"{type(self).__name__} has no strong form")
 
 
 def names(kind: type[Record] = Effect) -> list[str]:
-    """The names, in scene files, of the existing effects of a ``kind``."""
+    """The names, in scene files, of all effects of a ``kind``."""
     return [name for name in modules.names(__path__) if issubclass(_record(name), kind)]
 
 
 def find(name: str) -> type[Record]:
-    """The record of the effect ``name``; KeyError if there is none."""
+    """The class of the effect ``name``. Raises KeyError if there is no such effect."""
     if name not in modules.names(__path__):
         raise KeyError(name)
     return _record(name)
 
 
 def name_of(effect: Record | type[Record]) -> str:
-    """The name in scene files of an ``effect`` or of a kind of effects, which is the name of its file."""
+    """The name of an ``effect`` or of a class of effects in scene files, which is the name of its Python file."""
     return effect.__module__.rpartition(".")[2]
 
 
 def example(name: str) -> dict[str, Any]:
-    """An example of the parameters of the effect ``name``, including the parameters of its base classes."""
+    """Example values of the parameters of the effect ``name``, including the parameters of its base classes."""
     stated = [vars(kind).get("example", {}) for kind in reversed(find(name).__mro__)]
     return {key: value for one in stated for key, value in one.items()}
 
 
 def moduli(acting: Iterable[Record]) -> Moduli:
-    """The stiffness at rest of the effects ``acting`` together."""
+    """The stiffness at rest due to all effects in ``acting`` together."""
     found = [effect.moduli() for effect in acting if isinstance(effect, Effect)]
     return Moduli(*map(sum, zip(*found, strict=True)))
 
 
 def _record(name: str) -> type[Record]:
-    """The record in the file of the existing effect ``name``."""
+    """The class in the file of the existing effect ``name``."""
     return outside.only_record(importlib.import_module(f"{__name__}.{name}"), tuple(__path__), (Effect, FieldEffect))
 
 
 def make(name: str, **parameters: Any) -> "Effect":
-    """The effect ``name``, with parameters as in scene files, or as numbers in mm, N, MPa, s, tonne; InputError if one is wrong.
+    """Make the effect ``name``. Raises InputError if the name or a parameter is invalid.
+
+    ``parameters``: as in scene files, with units in the text, or as numbers in mm, N, MPa, s, rad and tonne.
 
     >>> make("neo_hooke", mu="10 kPa").mu, make("neo_hooke", mu=0.01).mu
     (0.01, 0.01)

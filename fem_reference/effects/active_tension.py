@@ -1,4 +1,4 @@
-"""A tension along the fibres that does not depend on their stretch."""
+"""Active tension along the fibres, independent of their stretch."""
 
 from typing import Any, ClassVar
 
@@ -8,8 +8,8 @@ from fem_reference.foundations.units import PositivePressure
 
 
 class ActiveTension(Ramped, Energy):
-    """``amount T/2 (J^(-2/3) fibre . C fibre - 1)``: at constant volume this gives a second Piola-Kirchhoff stress of ``amount T``
-    along the fibre, and a pressure, which is balanced by the resistance to volume change.
+    """``amount T/2 (J^(-2/3) fibre . C fibre - 1)``. At constant volume the second Piola-Kirchhoff stress is ``amount T`` along the
+    fibre, plus a pressure that the resistance to volume change balances.
 
     ``tension``: T [MPa]. Source: Land et al. 2015, problem 3, doi 10.1098/rspa.2015.0641, for incompressible material.
     """

@@ -6,9 +6,9 @@ from fem_reference.effects import FieldEffect, FieldState, Place
 
 
 class Advection(FieldEffect):
-    """``v . grad psi``; on a surface only the part of v along it acts. Report eq. 4.4: ``B = v``.
+    """``v . grad psi``; on a surface, only the tangential part of v acts. Report eq. 4.4: ``B = v``.
 
-    ``velocity``: v [length / time], with as many components as the domain has coordinates.
+    ``velocity``: v [length / time], with one component for each coordinate of the domain.
     """
 
     example: ClassVar[dict[str, Any]] = {"velocity": [1.0, -3.0]}
@@ -18,5 +18,5 @@ class Advection(FieldEffect):
         return self.along(psi)
 
     def along(self, function: FieldState) -> Any:
-        """The derivative of ``function`` along the flow, times its speed."""
+        """The derivative of ``function`` along the flow, times the speed of the flow."""
         return sum(v * slope for v, slope in zip(self.velocity, function.gradient, strict=True))

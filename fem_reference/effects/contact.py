@@ -13,7 +13,7 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 class Contact(Interaction):
     """A pressure that depends on the gap g to each bone (the signed distance, negative inside): 0 beyond the ``smoothing`` d,
-    ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` for deeper points, with k the ``stiffness``
+    ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` below -d, where k is the ``stiffness``
     (``fem_reference.problems.contact.ContactLaw``).
 
     ``stiffness`` [MPa/mm]: under the pressure p the surface penetrates the bone by at most p / stiffness. ``smoothing`` [mm]: the
@@ -31,7 +31,7 @@ class Contact(Interaction):
     friction: float | None = Field(default=None, gt=0)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The possible penetration of the surface into bones, and the pressure there."""
+        """The possible penetration of the surface into bones, and the resulting pressure."""
         near = {name: one for name, one in scene.near.items() if self.is_by(name)}
         gap = min((one.gap for one in near.values()), default=math.inf)
         depth, felt = math.hypot(*(one.depth for one in near.values())), self.smoothing + (self.support or 0.0)
@@ -40,10 +40,10 @@ class Contact(Interaction):
         return Indicator(rule, gap, depth, self.stiffness * max(depth, felt - gap, 0.0))
 
     def is_by(self, bone: str) -> bool:
-        """True if the bone of this name is in contact."""
+        """True if contact with the bone of this name is included."""
         return self.bones is None or bone in self.bones
 
 
 def among(acting: Iterable[Effect]) -> Contact | None:
-    """The contact among the effects of a scene, None if there is none."""
+    """The first effect of contact with bones in ``acting``; None if there is none."""
     return next((effect for effect in acting if isinstance(effect, Contact)), None)

@@ -1,4 +1,4 @@
-"""Isotropic elastic law that is linear in the stretches, as in Drake and in solvers of computer graphics."""
+"""Isotropic elastic law that is linear in the stretches, as in Drake and in computer graphics solvers."""
 
 from typing import Any
 
@@ -9,11 +9,12 @@ _STEPS = 4
 
 
 class Corotated(LameLaw):
-    """``mu |F - R|^2 + lame/2 (J - 1)^2`` with R the rotation in F: the fixed corotated law (Stomakhin et al. 2012, Energetically
-    consistent invertible elasticity, eq. 8).
+    """``mu |F - R|^2 + lame/2 (J - 1)^2``, where R is the rotation of F: the fixed corotated law (Stomakhin et al. 2012,
+    Energetically consistent invertible elasticity, eq. 8).
 
-    ``mu``, ``lame``: Lame's parameters [MPa]. ``|F - R|^2`` is ``I1 - 2 s + 3``, where s is the sum of the principal stretches, the
-    largest root of ``(s^2 - I1)^2 = 4 (I2 + 2 J s)``. For J < 0, four Newton steps leave an energy up to 6 % too small.
+    ``mu``, ``lame``: the Lame parameters [MPa]. ``|F - R|^2`` is ``I1 - 2 s + 3``, where the sum s of the principal stretches is
+    the largest root of ``(s^2 - I1)^2 = 4 (I2 + 2 J s)``. For J < 0 the energy is up to 6 % too small, as only four Newton steps
+    are made.
     """
 
     def energy(self, state: State) -> Any:
@@ -21,7 +22,7 @@ class Corotated(LameLaw):
 
 
 def _stretches(state: State) -> Any:
-    """The sum of the principal stretches, by Newton's method from an upper bound. The root is simple, even at rest."""
+    """The sum of the principal stretches, computed by Newton's method from an upper bound. The root is simple, even at rest."""
     I1, I2, J = state.I1, state.I2, state.J
     s = state.functions.sqrt(I1 + 2 * state.functions.sqrt(3 * I2))
     for _ in range(_STEPS):

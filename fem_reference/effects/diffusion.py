@@ -10,7 +10,7 @@ from fem_reference.effects import FieldEffect, FieldState, Place
 class Diffusion(FieldEffect):
     """``-div(k grad psi)``; on a surface, the Laplace-Beltrami operator. Report eq. 4.4: ``A = -k``.
 
-    ``coefficient``: k, above zero [length^2 / time, in the units of the scene].
+    ``coefficient``: k, greater than 0 [length^2 / time, in the units of the scene].
     """
 
     example: ClassVar[dict[str, Any]] = {"coefficient": 2.0}

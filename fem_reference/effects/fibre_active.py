@@ -1,4 +1,4 @@
-"""Active muscle fibres: a tension that activation causes, maximal at their optimal length."""
+"""Active muscle fibres: a tension due to activation, which is maximal at the optimal fibre length."""
 
 from typing import Any, ClassVar
 
@@ -19,13 +19,13 @@ PEAK_STRESS = Range(
 
 
 class FibreActive(Ramped, Energy):
-    """``dW/dl = amount stress g(l)``, with ``l`` the isochoric fibre stretch divided by the optimal stretch: ``g = 9 (l - 0.4)^2``
-    from 0.4, ``1 - 4 (1 - l)^2`` from 0.6, ``9 (l - 1.6)^2`` from 1.4, and 0 below 0.4 and above 1.6.
+    """``dW/dl = amount stress g(l)``, where ``l`` is the isochoric fibre stretch divided by the optimal stretch, and g is
+    ``9 (l - 0.4)^2`` from 0.4 to 0.6, ``1 - 4 (1 - l)^2`` from 0.6 to 1.4, ``9 (l - 1.6)^2`` from 1.4 to 1.6, and 0 elsewhere.
 
     ``stress`` [MPa]: the peak active stress; ``optimal_stretch``: the fibre stretch at optimal length; ``ramp``: the activation.
     Source: Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 
-    Valid for ``l`` from 0.4 to 1.6, the range in which fibres have a tension by this source. Outside it activation has no effect.
+    Valid for ``l`` from 0.4 to 1.6, the range in which fibres have a tension in this source. Outside it, activation has no effect.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)

@@ -1,4 +1,4 @@
-"""Passive fibres by the law of FEBio: resistance to stretch with a toe region followed by a line in the stretch."""
+"""Passive fibres as in FEBio: resistance to stretch, with a toe region followed by a part that is linear in the stretch."""
 
 from typing import Any, ClassVar
 
@@ -8,18 +8,19 @@ from pydantic import Field
 from fem_reference.effects import PassiveFibres, State
 from fem_reference.foundations.units import PositivePressure
 
-# On (0, 1), as Python floats, because numpy floats would turn symbols into arrays.
+# Points and weights on (0, 1), as Python floats, because numpy floats would turn symbols into arrays.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 RULE = tuple(zip(((_POINTS + 1) / 2).tolist(), (_WEIGHTS / 2).tolist(), strict=True))
 
 
 class FibrePassiveFebio(PassiveFibres):
-    """``l dW/dl = 0`` up to an isochoric fibre stretch ``l`` of 1, ``c3 (exp(c4 (l - 1)) - 1)`` up to ``linear_from``, and beyond
-    it ``c5 l + c6``, where c6 makes the function continuous.
+    """``l dW/dl``, where ``l`` is the isochoric fibre stretch, is 0 up to 1, ``c3 (exp(c4 (l - 1)) - 1)`` from 1 to
+    ``linear_from``, and ``c5 l + c6`` beyond, where c6 makes the function continuous.
 
-    ``c3``, ``c5`` [MPa], ``c4`` without unit. Source: FEBio Theory Manual, "Transversely Isotropic Hyperelastic"; Weiss, Maker and
-    Govindjee 1996, doi 10.1016/0045-7825(96)01035-3. The energy of the toe is an exponential integral, computed here by a
-    Gauss-Legendre rule. Its error is below 1e-12 c3 if ``c4 (linear_from - 1)`` is at most 6 and ``linear_from`` at most 2.
+    ``c3``, ``c5`` [MPa]; ``c4`` without unit; ``linear_from``: a value of ``l``. Source: FEBio Theory Manual, "Transversely
+    Isotropic Hyperelastic"; Weiss, Maker and Govindjee 1996, doi 10.1016/0045-7825(96)01035-3. The energy of the toe is an
+    exponential integral, which is computed by a Gauss-Legendre rule. The error of this rule is below 1e-12 c3 if
+    ``c4 (linear_from - 1)`` is at most 6 and ``linear_from`` is at most 2.
     """
 
     example: ClassVar[dict[str, Any]] = {"c3": "10 kPa", "c4": 12.0, "c5": "3 MPa", "linear_from": 1.3}

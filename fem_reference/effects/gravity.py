@@ -12,9 +12,9 @@ from fem_reference.foundations.units import AccelerationVector, Density
 
 
 class Gravity(Ramped, Energy):
-    """The energy ``-amount rho g . u``, with u the displacement.
+    """The energy ``-amount rho g . u``, where u is the displacement.
 
-    ``density``: rho at rest [tonne/mm^3]; ``acceleration``: g (3,) [mm/s^2].
+    ``density``: rho, the density at rest [tonne/mm^3]; ``acceleration``: the vector g (3,) [mm/s^2].
     """
 
     outer: ClassVar[bool] = True
@@ -23,7 +23,7 @@ class Gravity(Ramped, Energy):
     acceleration: AccelerationVector
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The sag of a beam under the weight."""
+        """The sag of a beam under its weight."""
         force = scene.greatest(self) * self.density * math.hypot(*self.acceleration)
         rule, stress = "weight per unit cross-sectional area divided by the shear modulus", force * scene.length
         return Indicator(rule, stress / scene.shear, scene.bend(force), stress)

@@ -9,12 +9,13 @@ from fem_reference.foundations.units import PositivePressure
 
 
 class Guccione(Energy):
-    """``c/2 (exp(Q) - 1)``, ``Q = bf Eff^2 + bt (Ess^2 + Enn^2 + 2 Esn^2) + 2 bfs (Efs^2 + Efn^2)``, with
-    ``E = (J^(-2/3) C - 1) / 2`` in axes along the fibre (f) and along any two perpendicular directions across it (s, n).
+    """``c/2 (exp(Q) - 1)`` with ``Q = bf Eff^2 + bt (Ess^2 + Enn^2 + 2 Esn^2) + 2 bfs (Efs^2 + Efn^2)``, where
+    ``E = (J^(-2/3) C - 1) / 2`` has axes along the fibre (f) and along two directions perpendicular to it and to each other (s, n).
 
     ``c`` [MPa]; ``bf``, ``bt``, ``bfs`` without unit. Source: Guccione, McCulloch and Waldman 1991, doi 10.1115/1.2894084, as in
     Land et al. 2015, doi 10.1098/rspa.2015.0641, both for incompressible material. Without the factor ``J^(-2/3)`` the pressure
-    unknown balances all of a large tension, and in the ventricle of Land et al. two layers of mixed elements lose equilibrium.
+    unknown would have to balance an entire large tension, and the ventricle of Land et al. with two layers of mixed elements would
+    lose equilibrium.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -28,7 +29,7 @@ class Guccione(Energy):
         return Moduli(shear=self.c * self.bt / 2)
 
     def energy(self, state: State) -> Any:
-        """Energy per unit rest volume [MPa]; ``|E fibre|^2`` and ``|E|^2`` give the sums over s and n."""
+        """Energy per unit rest volume [MPa]. The sums over s and n follow from ``|E fibre|^2`` and ``|E|^2``."""
         C, f, factor = state.C, state.fibre, state.J ** (-2 / 3)
         E = [[(factor * C[i][k] - (i == k)) / 2 for k in range(3)] for i in range(3)]
         along = [sum(E[i][k] * f[k] for k in range(3)) for i in range(3)]

@@ -1,4 +1,4 @@
-"""Two families of fibres at an angle to the fibre direction that stiffen as they are stretched, as in arteries and fascia."""
+"""Two families of fibres, at an angle to the fibre direction, which stiffen as they are stretched, as in arteries and fascia."""
 
 from functools import partial
 from typing import Annotated, Any, ClassVar
@@ -11,11 +11,11 @@ from fem_reference.foundations.units import Angle, PositivePressure
 
 
 class HolzapfelOgden(Energy):
-    """``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` for each family while it is stretched, with ``I = J^(-2/3) a . C a``.
+    """``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` for each family that is stretched, with ``I = J^(-2/3) a . C a`` above 1.
 
-    ``k1`` [MPa], ``k2`` without unit; ``angle`` [rad]: the unit vectors ``a`` are the fibre direction turned by plus and minus this
-    angle; ``normal``: the axis of this rotation, of any length and not along a fibre; only its component across the fibre counts.
-    Source: Holzapfel, Gasser and Ogden 2000, doi 10.1023/A:1010835316564.
+    ``k1`` [MPa]; ``k2`` without unit; ``angle`` [rad]: the unit vectors ``a`` of the two families are the fibre direction rotated
+    by plus and by minus this angle; ``normal``: the axis of this rotation, of any length and not along a fibre. Only the component
+    of ``normal`` perpendicular to the fibre matters. Source: Holzapfel, Gasser and Ogden 2000, doi 10.1023/A:1010835316564.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)

@@ -1,4 +1,4 @@
-"""Tension at rest: the given mesh is the muscle in the body, in equilibrium with stretched fibres."""
+"""Tension at rest: the given mesh is the muscle as it is in the body, in equilibrium with stretched fibres."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
@@ -9,18 +9,19 @@ from fem_reference.effects import Effect, Prestrain, State, moduli
 
 
 class InSitu(Prestrain):
-    """The energies depend on ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``, l the ``stretch`` along the fibre f. A stress at
-    rest balances all effects at the first frame, an activation included, so that ``F = 1`` is in equilibrium there.
+    """The energies depend on ``F Fp`` with ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``, where l is the ``stretch`` along the fibre f. A
+    stress at rest balances all effects at the first frame, including any activation, so that ``F = 1`` is in equilibrium there.
 
-    The energy of this stress per unit rest volume is ``2 mu dev(e) : E + p0 (J - 1)``, ``E = (F^T F - 1) / 2``, with fixed fields
-    ``e`` and ``p0``, so the stress rotates with the body. ``e`` and ``p0`` are the strain and pressure of an isotropic body under
-    the forces at rest, with the shear and bulk modulus at rest of the scene's effects. This stress has the least energy of all that
-    balance these forces. The isotropic body is supported by the springs of attachments, which are extended at rest, and by the
-    bones. Bones press where the muscle touches them or is within ``support`` of them (``contact``), through the tissue in between.
+    The energy of this stress per unit rest volume is ``2 mu dev(e) : E + p0 (J - 1)`` with ``E = (F^T F - 1) / 2`` and fixed fields
+    ``e`` and ``p0``, so that the stress rotates with the body. ``e`` and ``p0`` are the strain and the pressure of an isotropic
+    body under the forces at rest; the shear and bulk moduli of this body are the moduli at rest of the scene's effects. Of all
+    stresses that balance these forces, this stress has the least energy. The isotropic body is supported by the springs of
+    attachments, which are extended at rest, and by the bones. A bone presses where the muscle touches it, or where the muscle is
+    within the distance ``support`` of the bone (see ``contact``), through the tissue in between.
 
-    ``stretch``: without unit, above 1 if fibres are taut at rest; 1 if only an activation acts at rest.
-    Source: Maas, Erdemir, Halloran and Weiss 2016, doi 10.1016/j.jmbbm.2016.04.012, who find a prestrain in equilibrium with this
-    stretch by iteration; here its incompatible part is a constant stress, found by one linear problem.
+    ``stretch``: without unit; above 1 if fibres are taut at rest, 1 if only an activation acts at rest. Source: Maas, Erdemir,
+    Halloran and Weiss 2016, doi 10.1016/j.jmbbm.2016.04.012, who iterate to a prestrain that is in equilibrium with this stretch.
+    Here the incompatible part of the prestrain is replaced by a constant stress, which is the solution of one linear problem.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -32,19 +33,22 @@ class InSitu(Prestrain):
 
 
 def among(acting: Iterable[object]) -> InSitu | None:
-    """The tension at rest among the effects of a scene, None if there is none."""
+    """The first effect of tension at rest in ``acting``; None if there is none."""
     return next((effect for effect in acting if isinstance(effect, InSitu)), None)
 
 
 def moduli_of(effects: Sequence[Effect]) -> tuple[float, float]:
-    """The shear and bulk modulus [MPa] at rest of ``effects``; without a bulk modulus, ten times the shear modulus."""
+    """The shear modulus and the bulk modulus [MPa] at rest due to ``effects``. If the bulk modulus is 0, ten times the shear
+    modulus is returned instead.
+    """
     found = moduli(effects)
     return found.shear, found.bulk or 10 * found.shear
 
 
 def balancing(state: State, slopes: Sequence[Sequence[Any]], pressure: Any, shear: Any) -> Any:
-    """The energy per unit rest volume [MPa] of the stress at rest at ``state``, whose F is the total deformation gradient; ``e`` is
-    the symmetric part of ``slopes`` (3, 3), mu the modulus ``shear`` [MPa] and p0 the ``pressure`` [MPa].
+    """The energy per unit rest volume [MPa] of the stress at rest, at a ``state`` whose F is the total deformation gradient.
+
+    ``slopes`` (3, 3): a matrix whose symmetric part is ``e``; ``pressure``: p0 [MPa]; ``shear``: mu [MPa], as in ``InSitu``.
     """
     C, mean = state.C, sum(slopes[i][i] for i in range(3)) / 3
     strained = sum((slopes[i][k] + slopes[k][i]) / 2 * (C[i][k] - (i == k)) for i in range(3) for k in range(3))

@@ -1,4 +1,4 @@
-"""Membranes on the surface, which resist stretch but not bending: aponeuroses and fasciae."""
+"""Membranes on the surface that resist stretch but not bending, such as aponeuroses and fasciae."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar
@@ -10,15 +10,15 @@ from fem_reference.foundations.units import PositiveLength, PositivePressure
 
 
 class Membrane(Load):
-    """``h mu/2 (I + 1/a^2 - 3)`` per unit rest area, with ``I = tr C - N . C N`` the sum of the squared stretches in the surface, a
-    the ratio of present area to area at rest, and N the normal at rest: an incompressible neo-Hookean sheet in plane stress, whose
-    thickness follows from its area (Holzapfel 2000, Nonlinear Solid Mechanics, ch. 6.2, on membranes).
+    """``h mu/2 (I + 1/a^2 - 3)`` per unit rest area, where ``I = tr C - N . C N`` is the sum of the squared principal stretches in
+    the surface, a is the ratio of present area to area at rest, and N is the normal at rest. This is an incompressible neo-Hookean
+    sheet in plane stress, whose thickness follows from its area (Holzapfel 2000, Nonlinear Solid Mechanics, ch. 6.2, on membranes).
 
-    ``on``: the part of the surface; ``in``, if given: a region, in which the effect acts in proportion to the share, linear between
-    the vertices of cells; ``thickness``: h at rest [mm]; ``mu``: shear modulus at rest [MPa].
+    ``on``: the part of the surface; ``in``: an optional region, whose share weights the energy and is linear between the vertices
+    of cells; ``thickness``: h at rest [mm]; ``mu``: the shear modulus at rest [MPa].
 
-    Stretched by l in all directions the sheet has the tension ``h mu (1 - l^-6)`` per present length. A real sheet wrinkles in
-    compression; here it resists, like a sheet that the tissue below keeps flat.
+    If the sheet is stretched by l in all directions, its tension per unit of present length is ``h mu (1 - l^-6)``. A real sheet
+    wrinkles in compression; this sheet resists compression, as if the tissue below kept it flat.
     """
 
     outer: ClassVar[bool] = False

@@ -1,4 +1,4 @@
-"""Isotropic elastic matrix with separate terms for changes of lengths and of areas, but without resistance to volume change."""
+"""Isotropic elastic matrix with separate terms for changes of length and of area, but without resistance to volume change."""
 
 from typing import Any, ClassVar
 

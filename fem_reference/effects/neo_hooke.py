@@ -10,7 +10,7 @@ from fem_reference.foundations.units import PositivePressure
 class NeoHooke(Energy):
     """``mu/2 (J^(-2/3) tr C - 3)``: the isochoric neo-Hookean energy (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.143).
 
-    ``mu``: shear modulus at rest [MPa].
+    ``mu``: the shear modulus at rest [MPa].
     """
 
     example: ClassVar[dict[str, Any]] = {"mu": "10 kPa"}

@@ -13,31 +13,32 @@ _ROUNDED = 1e-6  # rounding of the components of unit normals in files with 32 b
 
 
 class Pressure(Ramped, Load):
-    """``-amount p J F^-T N``, with N the outward normal at rest: a pressure on the present surface, by Nanson's formula.
+    """``-amount p J F^-T N``, where N is the outward normal at rest: a pressure on the present surface, by Nanson's formula.
 
     ``on``: the part of the surface; ``pressure``: p [MPa], inwards if positive.
 
-    On the entire surface of a body that can shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is exactly 1 - p / K. A
-    clamped part keeps its size, and the body around it is sheared: in a cube of side L with one clamped triangle with legs a, V/V0
-    is larger by 0.15 mu / K (a / L)^3 p / K. For example, it is 0.9002 instead of 0.9 if a is L/2 and K is 10 mu.
+    If the pressure acts on the entire surface of a body that can shrink freely, and the volumetric energy is K/2 (J - 1)^2, then
+    V/V0 is exactly 1 - p / K. A clamped part does not shrink, so that the body around it is sheared and V/V0 is larger. In a cube
+    of side L with one clamped triangle with legs a, it is larger by 0.15 mu / K (a / L)^3 p / K: for example, 0.9002 instead of 0.9
+    if a is L/2 and K is 10 mu.
     """
 
     example: ClassVar[dict[str, Any]] = {"pressure": "8 kPa"}
     pressure: units.Pressure
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which the pressure compresses the muscle's thickness."""
+        """The distance by which the pressure reduces the thickness of the muscle."""
         load = scene.greatest(self) * abs(self.pressure)
         part = load / scene.shear
         return Indicator("ratio of pressure to shear modulus", part, part * scene.thickness / 3, load)
 
     def resultant(self, shape: Shape) -> Wrench | None:
-        """The load on the entire part in its present shape."""
+        """The force and moment on the entire part of the surface in its present shape."""
         found = shape.facing(self.on)
         return None if found is None else Wrench(*(-self.pressure * one for one in found))
 
     def along(self, normals: Floats) -> Bools:
-        """True for the components of the normals that are not zero, up to rounding."""
+        """Mask (f, 3) of the components of the ``normals`` (f, 3) that are not 0, up to rounding."""
         return normals > _ROUNDED
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:

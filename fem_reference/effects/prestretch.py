@@ -11,10 +11,10 @@ from fem_reference.foundations.records import rule
 
 
 class Prestretch(Ramped, Prestrain):
-    """The energies depend on ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``: a stretch ``l = 1 + amount (stretch - 1)`` along
-    the fibre f, at the same volume.
+    """The energies depend on ``F Fp`` with ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``: a stretch ``l = 1 + amount (stretch - 1)``
+    along the fibre f at constant volume.
 
-    ``stretch``: without unit, above 1 if fibres are taut at rest.
+    ``stretch``: without unit; above 1 if fibres are taut at rest.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -27,7 +27,7 @@ class Prestretch(Ramped, Prestrain):
     )
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The shortening of fibres as they are released, and the resulting stress of the matrix."""
+        """The shortening of fibres as they are released, and the resulting stress in the matrix."""
         part = scene.greatest(self) * abs(self.stretch - 1)
         return Indicator("stretch of the fibres minus 1", part, 0.1 * part * scene.length, 3 * scene.shear * part)
 

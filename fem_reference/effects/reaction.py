@@ -6,7 +6,7 @@ from fem_reference.effects import FieldEffect, FieldState, Place
 
 
 class Reaction(FieldEffect):
-    """``c psi``: decay for a positive, growth for a negative rate. Report eq. 4.4: ``C = c``.
+    """``c psi``: decay if c is positive, growth if it is negative. Report eq. 4.4: ``C = c``.
 
     ``rate``: c [1 / time].
     """

@@ -7,10 +7,11 @@ from fem_reference.foundations.formula import Formula, evaluate
 
 
 class Source(FieldEffect):
-    """``-f``, a source of strength f. Report eq. 4.4: ``D f``.
+    """``-f``: a source of strength f. Report eq. 4.4: ``D f``.
 
     ``strength``: f, a number or a formula of the coordinates [psi / time]; ``where``: everywhere, or only where y is above the mean
-    y of the mesh's vertices, as in listing 4.5, line 17. In an element cut by this line, f is multiplied by the fraction above.
+    y of the mesh vertices, as in listing 4.5 of the report, line 17. In an element that the mean y cuts, f is multiplied by the
+    fraction of the element above it.
     """
 
     example: ClassVar[dict[str, Any]] = {"strength": "x*y", "where": "everywhere"}

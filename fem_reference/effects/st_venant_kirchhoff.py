@@ -1,4 +1,4 @@
-"""Isotropic elastic law that is linear in Green's strain, as in MuJoCo and position based libraries."""
+"""Isotropic elastic law in which stress is linear in Green's strain, as in MuJoCo and libraries for position based dynamics."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from fem_reference.foundations.limits import Limit
 class StVenantKirchhoff(LameLaw):
     """``mu tr(E^2) + lame/2 (tr E)^2`` with ``E = (C - 1) / 2`` (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.151).
 
-    ``mu``, ``lame``: Lame's parameters [MPa]. Valid for V/V0 from 1/2 to 2: the law softens under compression, and a body that is
+    ``mu``, ``lame``: the Lame parameters [MPa]. Valid for V/V0 from 1/2 to 2: the law softens in compression, and a body that is
     pressed flat turns inside out without further resistance.
     """
 

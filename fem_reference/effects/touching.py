@@ -10,14 +10,14 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
 class MuscleContact(Interaction):
-    """The pressure law of ``contact``, applied equally to both sides of the gap between two muscles, or between parts of a single
-    muscle, with finite sliding (``fem_reference.problems.touching.Touching``).
+    """The pressure law of ``contact``, applied equally to both sides of the gap between two muscles or between parts of a single
+    muscle, with finite sliding (``fem_reference.problems.touching.Touching``). With several muscles, each touches the other muscles
+    but not itself.
 
     ``stiffness`` [MPa/mm]: under the pressure p the two sides overlap by at most p / stiffness. ``smoothing`` [mm]: the distance at
-    which contact begins, and the maximum overlap of two muscles, or of a muscle with itself, that is allowed at rest.
-    ``friction``: the coefficient of Coulomb's law, greater than 0; without it contact is frictionless. ``own_normals``: True if
-    the gap between two muscles is measured along the normal of each point instead of to the nearest point; not with friction. Each
-    of several muscles touches the others but not itself.
+    which contact begins, and the maximum overlap of two muscles, or of a muscle with itself, that is allowed at rest. ``friction``:
+    the coefficient of Coulomb's law, greater than 0; without it contact is frictionless. ``own_normals``: True if the gap between
+    two muscles is measured along the normal of each point instead of to the nearest point; not possible with friction.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm"}
@@ -28,5 +28,5 @@ class MuscleContact(Interaction):
 
 
 def among(acting: Iterable[Effect]) -> MuscleContact | None:
-    """The contact of muscles among the effects of a scene, None if there is none."""
+    """The first effect of contact of muscles in ``acting``; None if there is none."""
     return next((effect for effect in acting if isinstance(effect, MuscleContact)), None)

@@ -1,4 +1,4 @@
-"""A dead load: a force on a part of the surface with constant direction and size."""
+"""A dead load: a force of constant direction and size on a part of the surface."""
 
 import math
 from collections.abc import Sequence
@@ -29,11 +29,11 @@ class Traction(Ramped, Load):
         return Indicator("ratio of traction to shear modulus", part, part * scene.length / 3, load)
 
     def resultant(self, shape: Shape) -> Wrench:
-        """The load on the entire part."""
+        """The force and moment on the entire part of the surface."""
         return dead(self.force, shape, self.on)
 
     def along(self, normals: Floats) -> Bools:
-        """True for each axis along which the force is not 0."""
+        """Mask (f, 3) of the axes along which the force is not 0."""
         return np.broadcast_to(np.array(self.force) != 0, normals.shape)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:  # noqa: ARG002

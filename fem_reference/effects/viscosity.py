@@ -1,4 +1,4 @@
-"""Viscosity of the matrix, in parallel with its elastic law (Kelvin and Voigt).
+"""Viscosity of the matrix, in parallel with its elastic law (a Kelvin-Voigt material).
 
 With viscosity, short waves of an unstable state grow no faster than long waves.
 """
@@ -11,13 +11,15 @@ from fem_reference.foundations.units import Viscosity as Coefficient
 
 
 class Viscosity(Energy):
-    """A Cauchy stress of ``2 eta D``, D the rate of deformation with its volumetric part, which is 0 in incompressible material.
+    """A Cauchy stress of ``2 eta D``, where D is the rate of deformation including its volumetric part, which is 0 in
+    incompressible material.
 
-    Over a load step D is ``rate e`` (implicit Euler), ``e = (f^T f - 1)/2`` the Green strain of ``f = F F_before^-1``, and the
-    stress is the derivative of ``eta rate |e|^2`` per volume before the step. This is a potential of the step, not a stored energy,
-    and rotations do not change it. The stress agrees with the law above to first order in the step.
+    Over a load step D is replaced by ``rate e`` (implicit Euler), where ``e = (f^T f - 1)/2`` is the Green strain of
+    ``f = F F_before^-1``. The stress is the derivative of ``eta rate |e|^2`` per unit volume before the step. This expression is a
+    potential of the step, not a stored energy, and rotations do not change it. The stress agrees with ``2 eta D`` to first order in
+    the size of the step.
 
-    ``eta``: [MPa s].
+    ``eta``: the viscosity [MPa s].
     """
 
     needs: ClassVar[tuple[str, ...]] = ("interval",)
@@ -27,7 +29,7 @@ class Viscosity(Energy):
     eta: Coefficient
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The lag of a body, as a fraction of its travel, from its relaxation time."""
+        """The lag of a body, estimated from its relaxation time as a fraction of its travel, and the viscous stress."""
         rate = scene.in_time(scene.speed) / scene.length
         deborah = self.eta / scene.shear * rate
         rule, lag = "Deborah number, relaxation time divided by the time of the motion", 0.25 * deborah * scene.travel

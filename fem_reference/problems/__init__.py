@@ -1,1 +1,1 @@
-"""Scenes as arrays and equations for solvers: muscles, scalar fields, bodies of any shape. Independent of any solver."""
+"""Scenes as arrays and equations for solvers, but independent of any solver: muscles, scalar fields and bodies of any shape."""

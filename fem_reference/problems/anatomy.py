@@ -24,7 +24,7 @@ from fem_reference.io import files
 from fem_reference.scenes.fibres import PolylineFile, Traced
 from fem_reference.scenes.muscle import MuscleCase, Outline, VertexList
 
-# Sample points of a triangle: its middle, points near its corners, and points near the middles of its sides.
+# Sample points of a triangle: its centroid, points near its corners, and points near the midpoints of its sides.
 _SAMPLES = np.concatenate([np.full((1, 3), 1 / 3), 0.2 + 0.4 * np.eye(3), 0.45 - 0.35 * np.eye(3)[::-1]])
 # The maximum number of triangles of a draped patch: enough for a patch of several metres.
 _MOST_TRIANGLES = 2**20
@@ -34,7 +34,8 @@ _SIDE = 2.0
 
 def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
     """The sorted vertices (k,) of the muscle's ``surface`` that ``case.attachment[i]`` attaches to a bone with ``bone_surface``.
-    InputError names the unusable key of the case, or the file and row (not counting comment lines).
+
+    Raises InputError that names the invalid key of the case, or the file and its row (comment lines do not count).
     """
     attachment = case.attachment[i]
     key = f"attachment[{i}]"
@@ -51,7 +52,7 @@ def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> I
 
 
 def unshifted(case: MuscleCase) -> MuscleCase:
-    """The case with its attachments at their unshifted landmarks; the case itself if no outline is shifted."""
+    """A copy of the case whose outlines are at their unshifted landmarks; the case itself if no outline is shifted."""
     still = tuple(
         one.model_copy(update={"outline": one.outline.model_copy(update={"shift": None})})
         if one.outline and one.outline.shift and one.outline.shift.by
@@ -62,7 +63,7 @@ def unshifted(case: MuscleCase) -> MuscleCase:
 
 
 def tendon_of(case: MuscleCase, i: int) -> Floats | None:
-    """The point (3,) [mm] of the tendon of ``case.attachment[i]``: the middle of its landmarks; None without a tendon."""
+    """The point (3,) [mm] of the tendon of ``case.attachment[i]``: the mean of its landmarks; None without a tendon."""
     if (tendon := case.attachment[i].tendon) is None:
         return None
     key = f"attachment[{i}].tendon"
@@ -75,9 +76,11 @@ def tendon_of(case: MuscleCase, i: int) -> Floats | None:
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
-    """The outward boundary triangles (m, 3) of a ``mesh`` in a ``surface`` that count as attached, for a mesh that does not follow
-    the rim. Their attached share, averaged over seven samples, is above 1/2. ``shares`` (k, 3): the attached shares of the corners
-    of each triangle of ``surface``.
+    """The outward boundary triangles (m, 3) of a ``mesh`` that count as attached, if the mesh does not follow the rim of the
+    attachment.
+
+    A triangle is attached if its attached share, averaged over seven sample points, is above 1/2. ``surface``: the surface that the
+    mesh fills; ``shares`` (k, 3): the attached shares of the corners of each triangle of this surface.
     """
     triangles, _ = boundary(mesh.tets)
     samples = np.einsum("qk,mkd->mqd", _SAMPLES, mesh.points[triangles]).reshape(-1, 3)
@@ -86,7 +89,7 @@ def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
 
 
 def _listed(path: Path, chosen: VertexList, count: int) -> Ints:
-    """The vertices in a file with rows ``vertex[,value]``; the surface has ``count`` vertices."""
+    """The ``chosen`` vertices in a file with rows ``vertex[,value]``. ``count``: the number of vertices of the surface."""
     vertices = []
     for number, row in enumerate(files.read_rows(path), start=1):
         if number == 1 and _is_header(row[0]):
@@ -104,7 +107,7 @@ def _listed(path: Path, chosen: VertexList, count: int) -> Ints:
 
 
 def _is_header(cell: str) -> bool:
-    """True if the first cell of a list is a word: the cell has a letter and does not begin like a number (``1e5``)."""
+    """True if the first cell of a file is a word: it contains a letter and does not begin like a number (``1e5``)."""
     return any(character.isalpha() for character in cell) and re.match(r"[-+.]?\d", cell) is None
 
 
@@ -118,7 +121,7 @@ def _quoted(text: str) -> str:
 
 
 def _patches(path: Path, outline: Outline, place: str) -> Surface:
-    """The patches spanned by the clouds of an outline, as one surface [mm]; ``place`` is the key of the clouds."""
+    """The patches that the clouds of an ``outline`` span, as one surface [mm]. ``place``: the key of the clouds for messages."""
     clouds, shift, patches = _clouds(path, outline.unit), outline.shift, []
     moved = np.zeros(3) if shift is None else shift.by * np.array(shift.along) / np.linalg.norm(shift.along)
     for name in outline.clouds:
@@ -131,9 +134,9 @@ def _patches(path: Path, outline: Outline, place: str) -> Surface:
 
 
 def draped(patches: Surface, bone_surface: Surface) -> Surface:
-    """The patches draped on the bone: triangles with sides of at most 2 mm, whose corners are moved to the nearest points of the
-    bone. Landmarks lie on the bone, but triangles between them need not. Over the hollow of the iliac fossa they are 13 mm off the
-    bone, which is more than the thickness of the muscle.
+    """The ``patches`` draped on the bone: they are cut into triangles with sides of at most 2 mm, whose corners are then moved to
+    the nearest points of the bone. Landmarks lie on the bone, but triangles between them need not: over the hollow of the iliac
+    fossa they are 13 mm from the bone, which is more than the thickness of the muscle.
     """
     longest = _longest_side(patches)
     if len(patches.triangles) * (longest / _SIDE) ** 2 > _MOST_TRIANGLES:
@@ -150,7 +153,9 @@ def _longest_side(surface: Surface) -> float:
 
 
 def fan(points: Floats) -> Surface:
-    """Triangles of the centroid of ``points`` (n, 3) and two successive points, ordered by angle in the best-fit plane."""
+    """A fan of triangles between the centroid of ``points`` (n, 3) and each two neighbouring points. Neighbours follow each other
+    in the order of their angles in the best-fit plane.
+    """
     centre = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - centre)
     x, y, _ = axes @ (points - centre).T
@@ -160,7 +165,7 @@ def fan(points: Floats) -> Surface:
 
 
 def _clouds(path: Path, unit: float) -> dict[str, list[list[float]]]:
-    """Landmarks [mm] by cloud, from rows ``cloud,landmark,x,y,z`` below a header row."""
+    """The landmarks [mm] of each cloud in a file with rows ``cloud,landmark,x,y,z`` below a header row."""
     clouds: dict[str, list[list[float]]] = {}
     for number, row in enumerate(files.read_rows(path), start=1):
         try:
@@ -179,14 +184,17 @@ def _clouds(path: Path, unit: float) -> dict[str, list[list[float]]]:
 
 log = logging.getLogger(__name__)
 
-# Fibres are traced in a separate mesh of about this many tets.
+# Fibres are traced in a separate mesh of about this number of tetrahedra.
 TETS = 8000
 # Lines traced for each required surface fibre; the outermost lines, just below the surface, become the surface fibres.
 _OUTER = 5
 
 
 def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
-    """The fibres of a case in the closed ``surface`` of its muscle, and their direction at any point."""
+    """The fibres of a case inside the closed ``surface`` of its muscle, and the fibre direction of the material at any point.
+
+    ``fill``: a function that fills the surface with tetrahedra of a given size [mm].
+    """
     lines, directions = lines_of(case, surface, fill)
     if case.fibres.turned is not None:
         directions = Turned(directions, _turning(case))
@@ -194,15 +202,17 @@ def fibres_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMes
 
 
 def _turning(case: MuscleCase) -> Floats:
-    """The matrix (3, 3) from the directions of the lines to the directions in the material."""
+    """The rotation (3, 3) from the directions of the lines to the fibre directions of the material."""
     if (turned := case.fibres.turned) is None:
         return np.eye(3)
     return RigidMotion(turned.axis, (0.0, 0.0, 0.0), (0.0,), (turned.angle,)).pose(0.0)[:3, :3]
 
 
 def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
-    """The fibres of a case from their source, perhaps partly outside the ``surface``, and their direction at any point, from the
-    nearest fibre or from a field between attachments. If a source needs tetrahedra, ``fill`` makes them, given a size [mm].
+    """The fibres of a case as given by their source, with points that may be outside ``surface``, and the direction at any point.
+
+    The direction is that of the nearest fibre, or of a field between attachments. ``fill``: a function that fills the surface with
+    tetrahedra of a given size [mm], for sources that need tetrahedra.
     """
     if (lines := _given(case)) is not None:
         return lines, NearestLine(lines)
@@ -222,7 +232,7 @@ def lines_of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh
 
 
 def _along_field(mesh: TetMesh, asked: Traced, count: int) -> tuple[Polylines, Directions]:
-    """``count`` lines of the requested (``asked``) Laplace field, and its directions."""
+    """``count`` lines along the Laplace field that ``asked`` describes, and the directions of this field."""
     if asked.flux == "area":
         flux = area_flux(mesh, asked.start, asked.end)
         return streamlines(flux, count), flux.field
@@ -231,14 +241,14 @@ def _along_field(mesh: TetMesh, asked: Traced, count: int) -> tuple[Polylines, D
 
 
 def field_mesh(surface: Surface, fill: Callable[[float], TetMesh]) -> TetMesh:
-    """The tetrahedra in a closed ``surface`` for fields between attachments, made by ``fill``, given a size [mm]."""
+    """The tetrahedra for fields between attachments. ``fill``: a function that fills ``surface`` with tetrahedra of a size [mm]."""
     return fill(float(np.cbrt(6 * np.sqrt(2) * enclosed_volume(surface.points, surface.triangles) / TETS)))
 
 
 def lean(case: MuscleCase, axis: Floats) -> float:
-    """The inclination of given fibres to the unit vector ``axis`` (3,): the rms of ``sin 2 a``, with a the angle between
-    fibre and axis. It scales the shear due to the tension of fibres. Traced and mapped fibres follow the axis, except for
-    pennation and rotation.
+    """The inclination of fibres to the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, where a is the angle between
+    fibre and axis. The shear due to the tension of fibres is proportional to it. Traced and mapped fibres are assumed to follow the
+    axis, apart from pennation and the rotation ``turned``.
     """
     turning = _turning(case)
     if (lines := _given(case)) is None:
@@ -253,7 +263,7 @@ def lean(case: MuscleCase, axis: Floats) -> float:
 
 
 def _given(case: MuscleCase) -> Polylines | None:
-    """The fibres in the files of a case, or fibres between the surface fibres in its files; None if it has neither."""
+    """The fibres in the files of a case, or fibres interpolated between surface fibres in its files; None if there are no files."""
     if (given := case.fibres.polylines) is not None:
         return _read(case, given, "fibres.polylines")
     if (asked := case.fibres.chmd) is not None and asked.heads is not None:
@@ -267,7 +277,7 @@ def _read(case: MuscleCase, given: PolylineFile, key: str) -> Polylines:
 
 
 def inside(surface: Surface, fibres: Polylines) -> Polylines:
-    """The fibres with points outside the ``surface`` moved to its nearest points, as there is no solution outside."""
+    """The ``fibres`` with points outside the ``surface`` moved to its nearest points, because there is no solution outside."""
     away = signed_distances(fibres.points, surface)
     points = np.array(fibres.points)
     points[away > 0] = distances(points[away > 0], surface).closest

@@ -1,6 +1,6 @@
 """Bodies of any shape: straight or curved cells, boundary conditions, effects and contact.
 
-Independent of any solver.
+This module is independent of any solver.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -23,10 +23,10 @@ from fem_reference.problems.problem import NOTHING, AtRest, Task
 from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
 from fem_reference.problems.touching import Touching
 
-_OUTWARDS = 0.7  # fields are also checked at this fraction of the distance from the middle of a cell to each node
+_OUTWARDS = 0.7  # fields are also checked at this fraction of the distance from the centre of a cell to each node
 Kind = Literal["tetrahedron", "hexahedron"]
-# By element: kind of cell, degree of the displacement, degree of the pressure (None: no pressure unknown; 0: constant in each
-# cell). If both degrees are equal, solvers stabilise the pressure (``is_stabilised``).
+# For each element: the kind of cell, the degree of the displacement, and the degree of the pressure (None: no pressure unknown; 0:
+# constant in each cell). If both degrees are equal, solvers stabilise the pressure (``is_stabilised``).
 ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
     "P1": ("tetrahedron", 1, None),
     "P1/P1": ("tetrahedron", 1, 1),
@@ -41,10 +41,10 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 
 
 def is_stabilised(element: str) -> bool:
-    """True for an element with displacement and pressure of the same degree: its pressure would oscillate without stabilisation.
+    """True if displacement and pressure have the same degree, so that the pressure would oscillate without stabilisation.
 
-    The added energy is ``-1 / (4 mu) integral of (p - its mean in the cell)^2``. The cell's shear modulus mu at rest is the mean of
-    the second derivatives of the energy with respect to F_ij, i != j. This energy decreases with the square of the cell size.
+    Solvers add the energy ``-1 / (4 mu) integral of (p - its mean in the cell)^2``, which decreases with the square of the cell
+    size. The shear modulus mu of the cell at rest is the mean of the second derivatives of its energy with respect to F_ij, i != j.
 
     Source: Dohrmann and Bochev 2004, doi 10.1002/fld.752; with 2 mu as in White and Borja 2008, doi 10.1016/j.cma.2008.05.015.
     """
@@ -53,7 +53,7 @@ def is_stabilised(element: str) -> bool:
 
 
 def outer_facets(mesh: "Cells") -> tuple[Ints, Ints]:
-    """The facets that belong to one cell only, as sorted corners (f, 3 or 4) as in ``facet_corners``, and this cell (f,)."""
+    """The facets that belong to one cell only: corners (f, 3 or 4), in the order of ``facet_corners``, and the cells (f,)."""
     sides = np.array(facet_corners(mesh.kind))
     every = mesh.cells[:, sides].reshape(-1, sides.shape[1])
     found = distinct(np.sort(every, axis=1))
@@ -62,7 +62,7 @@ def outer_facets(mesh: "Cells") -> tuple[Ints, Ints]:
 
 
 def facet_corners(kind: Kind) -> list[tuple[int, ...]]:
-    """The corners of each facet of a cell, in the order of the cell's corners."""
+    """The indices of the corners of each facet of a cell, in increasing order."""
     if kind == "tetrahedron":
         return list(combinations(range(4), 3))
     corners = reference_nodes(kind, 1)
@@ -70,8 +70,10 @@ def facet_corners(kind: Kind) -> list[tuple[int, ...]]:
 
 
 def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, ...], place: str) -> None:
-    """Raise an InputError that names ``place`` unless an ``element``, a key of ``ELEMENTS``, suits cells and effects. Its
-    displacement must have at least the ``degree`` of the cells, and it must have a pressure if and only if an effect needs one.
+    """Raise InputError that names ``place`` unless the ``element``, a key of ``ELEMENTS``, suits the cells and the effects.
+
+    The displacement must have at least the ``degree`` of the cells. The element must have a pressure if and only if an effect needs
+    the pressure as an unknown.
     """
     if element not in ELEMENTS:
         raise InputError(place, f'"{element}"', f"one of {', '.join(ELEMENTS)}")
@@ -83,28 +85,28 @@ def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, 
     ]
     if element not in fitting:
         cells = f"{'curved ' if degree > 1 else ''}{kind} cells"
-        pressure = "with a pressure, which an effect brings" if brings else "without a pressure, which no effect brings"
+        pressure = "with a pressure, which an effect needs" if brings else "without a pressure, which no effect needs"
         raise InputError(place, f'"{element}"', f"an element for {cells} {pressure}: {', '.join(fitting)}")
 
 
 def check_stiffness(effects: tuple[Effect, ...], place: str) -> None:
-    """Raise an InputError that names ``place`` unless laws resist shear and a change of volume at rest: fibres alone do neither."""
+    """Raise InputError that names ``place`` unless laws resist both shear and a change of volume at rest; fibres resist neither."""
     found = moduli(effects)
     for kind, modulus, law in (("shape", found.shear, "neo_hooke"), ("volume", found.bulk, "incompressible")):
         if not modulus > 0:
             got = f"effects that do not resist a change of {kind} at rest"
-            raise InputError(place, got, f'a law that does, such as "{law}", besides fibres and loads')
+            raise InputError(place, got, f'a law that resists it, such as "{law}", besides fibres and loads')
 
 
 def check_quadrature(element: str, degree: int | None, place: str) -> None:
-    """Raise an InputError if quadrature of a ``degree`` cannot integrate the variation of a stabilised pressure in a cell."""
+    """Raise InputError if quadrature of a ``degree`` cannot integrate the variation of a stabilised pressure in a cell."""
     if degree == 1 and is_stabilised(element):
         raise InputError(place, degree, f"2 or more for {element}, whose pressure is stabilised")
 
 
 def reference_nodes(kind: Kind, degree: int) -> Floats:
-    """Positions (k, 3) of a cell's nodes in the reference cell (unit tetrahedron or unit cube), in the order of ``Cells.cells``:
-    corners first, ordered by (z, y, x); for degree 2 then the other nodes in the same order.
+    """The positions (k, 3) of the nodes of the reference cell (the unit tetrahedron or the unit cube), in the order of
+    ``Cells.cells``: the corners, sorted by (z, y, x), and for degree 2 then the other nodes, sorted in the same way.
     """
     ticks = np.arange(3) / 2
     x, y, z = (axis.ravel() for axis in np.meshgrid(ticks, ticks, ticks, indexing="ij"))
@@ -117,9 +119,9 @@ def reference_nodes(kind: Kind, degree: int) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """The mesh of a body: ``points`` (n, 3) [mm] at rest, and ``cells`` (m, k), the indices of the points of each cell
-    in the order of :func:`reference_nodes`. ``degree`` 1: straight cells; 2: curved cells. ``facets``: by name of a
-    region of the surface, the corners (f, 3 or 4) of its facets.
+    """The mesh of a body. ``points`` (n, 3) [mm]: the points at rest. ``cells`` (m, k): the indices of the points of each cell, in
+    the order of :func:`reference_nodes`. ``degree``: 1 for straight cells, 2 for curved cells. ``facets``: the corners (f, 3 or 4)
+    of the facets of each region of the surface, by name.
     """
 
     points: Floats
@@ -129,7 +131,7 @@ class Cells:
     facets: dict[str, Ints]
 
     def places(self) -> Iterator[Floats]:
-        """Points (m, 3) [mm] in the cells at which fields are checked: their middles, and near each of their nodes."""
+        """Yield points (m, 3) [mm], one in each cell, at which fields are checked: the centres, then points near each node."""
         nodes = self.points[self.cells]
         middles = nodes.mean(axis=1)
         yield middles
@@ -139,12 +141,15 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """A prescribed displacement of a part of the surface, ``on`` a region of ``Cells.facets`` or on a skin; its reaction force is
-    reported under its ``name``. ``components``: the prescribed axes, 0, 1, 2 for x, y, z. ``path``: a picklable callable of rest
-    points (n, 3) [mm] and a frame number, which returns displacements (n, 3) [mm]. ``stiffness`` [MPa/mm]: the stiffness of springs
-    over the area, which pull towards the path; None if the displacement is exact. A skin has springs only. ``anchor`` [mm]: the
-    rest position of a point that follows the path. All springs of a skin go to this point as straight tendons, and pull while they
-    are longer than at rest.
+    """A prescribed displacement of a part of the surface, exact or by springs.
+
+    ``name``: the name under which the reaction force is reported. ``on``: the name of a region in ``Cells.facets``, or a skin.
+    ``components``: the prescribed axes, 0, 1, 2 for x, y, z. ``path``: a picklable function of rest points (n, 3) [mm] and a frame
+    number that returns displacements (n, 3) [mm]. ``stiffness`` [MPa/mm]: the stiffness per unit area of springs that pull towards
+    the path; None if the displacement is exact. On a skin only springs are possible.
+
+    ``anchor`` [mm]: the rest position of a point that follows the path. If it is given, the springs of the skin are straight
+    tendons to this point, which pull while they are longer than at rest.
     """
 
     name: str
@@ -155,7 +160,7 @@ class Prescribed:
     anchor: tuple[float, float, float] | None = None
 
     def displacements(self, points: Floats, frame: float) -> Floats:
-        """The path's displacements (n, 3) [mm] of ``points`` (n, 3), 0 along other components; InputError if it returns none."""
+        """The displacements (n, 3) [mm] of ``points`` (n, 3), 0 along axes without prescription. InputError if the path fails."""
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:
             found = np.asarray(self.path(np.array(points), frame))
@@ -169,7 +174,7 @@ class Prescribed:
         return np.asarray(np.where(np.isin(np.arange(3), self.components), found, 0.0))
 
     def moving(self, points: Floats) -> Moving:
-        """The motion of ``points`` (n, 3) [mm] by the path."""
+        """The motion of ``points`` (n, 3) [mm] along the path."""
         name, known = f'prescribed "{self.name}"', turning(self.path, points)
         return Moving(name, lambda frame: points + self.displacements(points, frame), known)
 
@@ -187,11 +192,13 @@ class ByCell:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A body of ``mesh`` with its ``effects``, at rest at ``frames[0]``. A load acts on the facets that its ``on`` names;
-    ``contact``, if any, acts with every bone, and ``touching`` between parts of the surface. ``interval`` [s]: the time between
-    frame numbers, None if nothing depends on time. ``start``: the map of rest points (n, 3) to their positions at ``frames[0]``, if
-    the body does not start at rest. ``regions``: the regions in which effects act, by name. ``within``: for regions of one of
-    several pieces, the range of its cells.
+    """A body: a ``mesh`` with ``effects`` and ``prescribed`` displacements, at rest at ``frames[0]`` unless it has a ``start``.
+
+    A load acts on the facets of the region that its ``on`` names. ``contact``: the law of contact with all ``bones``, None without
+    contact. ``touching``: the laws of contact between parts of the surface. ``interval`` [s]: the time between consecutive frame
+    numbers, None if nothing depends on time. ``start``: a function from rest points (n, 3) to their positions at ``frames[0]``.
+    ``regions``: the regions in which effects act, by name. ``within``: the range of cells of each region that is limited to one of
+    several pieces of the mesh, by name.
     """
 
     mesh: Cells
@@ -212,24 +219,24 @@ class Body:
 
     @property
     def first(self) -> float:
-        """The first requested frame: an overlap at rest is relaxed before it."""
+        """The first requested frame. An overlap at rest is removed before this frame."""
         return next((frames[1] for frames in self._relaxed), self.frames[0])
 
     @property
     def _relaxed(self) -> list[tuple[float, float]]:
-        """The frames between which overlaps at rest are removed."""
+        """The pairs of frames between which overlaps at rest are removed."""
         found = [law.relaxed for law in self.touching] + ([self.contact.relaxed] if self.contact else [])
         return [frames for frames in found if frames is not None]
 
     @property
     def begun(self) -> bool:
-        """True unless the body begins at rest and free of stress."""
+        """True unless the body starts at rest and free of stress."""
         tense = in_situ.among(self.effects) is not None
         return self.start is not None or tense or (self.contact is not None and self.contact.in_situ is not None)
 
     @property
     def rubs(self) -> bool:
-        """True if there is friction, so that a state depends on the path to it."""
+        """True if there is friction, so that a state depends on the load path."""
         return any(one is not None for one in self.frictions)
 
     @property
@@ -244,17 +251,20 @@ class Body:
 
     @property
     def frictions(self) -> list[float | None]:
-        """The coefficients of friction of contact and of each pair of touching parts, None without friction."""
+        """The coefficients of friction of the contact with bones and of each pair of touching parts; None without friction."""
         own = [self.contact.friction] if self.contact else []
         return [*own, *(law.friction for law in self.touching)]
 
     @property
     def size(self) -> float:
-        """The diagonal of the box around the body [mm]."""
+        """The diagonal of the bounding box of the body [mm]."""
         return diagonal(self.mesh.points)
 
     def shares(self, points: Floats, cells: Ints) -> dict[str, Floats]:
-        """The shares (n,) of rest ``points`` (n, 3) [mm] in ``cells`` (n,) in each region that an effect names."""
+        """The shares (n,) of points in each region that an effect names, by the name of the region.
+
+        ``points`` (n, 3) [mm]: the rest positions of the points; ``cells`` (n,): the cells in which they are.
+        """
         found = {name: self.regions[name](points) for name in regions_named(self.effects)}
         for name in set(found) & set(self.within):
             first, last = self.within[name]
@@ -267,7 +277,10 @@ class Body:
 
     @cached_property
     def stops(self) -> tuple[float, ...]:
-        """Frame numbers at which load steps end, so that none skips motion or the end of an overlap; InputError for bad paths."""
+        """The frame numbers at which load steps must end, so that no step skips motion or the end of the removal of an overlap.
+
+        Raises InputError if a path cannot be followed.
+        """
         things = [entry.moving(some(self.points_on(entry.on))) for entry in self.prescribed]
         things += [posed(f'bone "{one.name}"', one.pose, self.mesh.points) for one in self.bones]
         ramps = (moving_ramp(effect, self.size) for effect in self.effects)

@@ -1,4 +1,4 @@
-"""Checks of bodies before they are solved; errors name the part that is wrong."""
+"""Checks of bodies before they are solved. Errors name the invalid part."""
 
 from collections.abc import Sequence
 from itertools import combinations, pairwise
@@ -24,13 +24,13 @@ from fem_reference.problems.body import (
 from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.touching import Touching, check_touching
 
-SAME = 1e-6  # fraction of the body's size by which two prescriptions of one displacement may differ
+SAME = 1e-6  # the fraction of the body's size by which two prescribed displacements of a point may differ
 _FLAT = 1e-9  # a cell is flat if the determinant of three edges is below this fraction of its longest edge cubed
 _FARTHEST = 1e9  # the maximum distance [mm] of a point from the origin
-_MOST = 100_000  # the largest number of frames
-_MOST_CELLS = 10_000_000  # the largest number of cells of a box
-_SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and relative to each other
-_THINNEST = 1e6  # length / thickness of a cell: stiffnesses differ by the square of this ratio, too much for doubles
+_MOST = 100_000  # the maximum number of frames
+_MOST_CELLS = 10_000_000  # the maximum number of cells of a box
+_SHORTEST, _LONGEST = 1e-6, 1e6  # the minimum edge of a box [mm], and the maximum ratio of two edges
+_THINNEST = 1e6  # the limit of length / thickness of a cell; stiffnesses differ by its square, too much for doubles
 
 
 def check(body: Body, element: str, quadrature_degree: int | None = None) -> None:
@@ -87,7 +87,7 @@ def _check_kind(place: str, kind: Any, degree: Any) -> None:
 
 
 def check_frames(frames: object, place: str) -> None:
-    """Raise InputError unless ``frames`` are increasing numbers."""
+    """Raise InputError that names ``place`` unless ``frames`` are increasing numbers."""
     if (
         isinstance(frames, str | bytes)
         or not isinstance(frames, Sequence | np.ndarray)
@@ -102,7 +102,7 @@ def check_frames(frames: object, place: str) -> None:
 
 
 def _is_number(value: Any) -> bool:
-    """True for a finite number that is not a bool."""
+    """True for a number of magnitude up to 1e9 that is not a bool."""
     number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
     return number and bool(abs(value) <= _FARTHEST)
 
@@ -138,7 +138,7 @@ def _check_rest(body: Body) -> None:
 
 
 def _check_cells(mesh: Any) -> None:
-    """Raise InputError unless ``mesh`` has finite points, and cells and facets between them."""
+    """Raise InputError unless ``mesh`` has finite points, and valid cells and facets on these points."""
     if not isinstance(mesh, Cells):
         raise InputError("mesh", said(mesh), "Cells")
     _check_kind("mesh.", mesh.kind, mesh.degree)
@@ -178,7 +178,7 @@ def _check_volumes(mesh: Cells) -> None:
 
 
 def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
-    """Raise InputError if two entries share a name, under which forces are reported, or a spring stiffness is not positive."""
+    """Raise InputError if a prescribed displacement is invalid, or if two share a name, under which forces are reported."""
     names = [entry.name for entry in prescribed if isinstance(entry.name, str)]
     for entry in prescribed:
         place = f"prescribed.{entry.name}"
@@ -218,7 +218,7 @@ def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
 
 
 def _check_needs(body: Body) -> None:
-    """Raise InputError if an effect needs fibre directions or times that a body lacks, or directions are not unit vectors."""
+    """Raise InputError if an effect needs fibre directions or times that the body lacks, or if directions are not unit vectors."""
     needs = {need for effect in body.effects for need in effect.needs}
     if body.interval is None and "interval" in needs:
         raise InputError("interval", "nothing", "the time from a frame number to the next, which an effect needs")
@@ -231,10 +231,12 @@ def _check_needs(body: Body) -> None:
 
 
 def check_agreement(body: Body) -> None:
-    """Raise InputError if a part of the body lacks a law (``regions.check``), the normal of a law is along fibres, or a tendon or
-    friction is combined with tension at rest. Raise InputError also if a load acts along prescribed axes alone, two regions
-    prescribe different exact displacements at shared points, or a path cannot be followed. Displacements are compared at all
-    frames, at all stops, and halfway between them.
+    """Raise InputError if the parts of a body do not agree, or if a path cannot be followed.
+
+    In every part of the body the required laws must act (``regions.check``), and the normal of a law must not be along fibres. A
+    tendon or friction must not be combined with tension at rest, and a load must not act only along exactly prescribed axes. Two
+    regions must not prescribe different exact displacements at shared points; displacements are compared at all frames, at all
+    stops, and halfway between them.
     """
     regions.check(body)
     directions.check_normals(body)
@@ -257,7 +259,7 @@ def check_agreement(body: Body) -> None:
 
 
 def _check_start(body: Body) -> None:
-    """Raise InputError if a prescribed displacement is not zero at the first frame, at which a body is at rest."""
+    """Raise InputError if a prescribed displacement is not zero at the first frame of a body that starts at rest."""
     for entry in body.prescribed if body.start is None else ():
         off = np.abs(entry.displacements(body.points_on(entry.on), body.frames[0])).max(initial=0.0)
         if not off <= SAME * body.size:

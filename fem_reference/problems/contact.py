@@ -13,11 +13,12 @@ from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.signed_distance import FAR, signed_distances
 from fem_reference.geometry.skins import Skin
 
-# The maximum fraction of the unattached surface that may be exempt from contact; above half of it there is a warning.
+# The maximum fraction of the unattached surface that may be exempt from contact. More than half of this fraction causes a warning.
 _LOST = 0.5
-# The least half thickness of a bone, in spacings of contact points: a thinner bone passes between four points 0.71 spacings away.
+# The minimum half thickness of a bone, in spacings of contact points. A thinner bone could pass between four contact points, at a
+# distance of 0.71 spacings from each.
 _THINNEST = 0.75
-# Beyond this fraction of half a bone's thickness, the direction in which to remove an overlap at rest is not defined.
+# If an overlap at rest exceeds this fraction of the half thickness of a bone, the direction in which to remove it is not defined.
 _MIDDLE = 0.95
 
 log = logging.getLogger(__name__)
@@ -25,7 +26,9 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class ContactBone:
-    """A bone: its ``shape`` at rest, and its ``pose``, from a frame number to a 4 x 4 matrix; both picklable."""
+    """A bone in contact. ``shape``: its distance function at rest; ``pose``: a function from a frame number to a 4 x 4 matrix. Both
+    must be picklable.
+    """
 
     name: str
     shape: Obstacle
@@ -34,22 +37,24 @@ class ContactBone:
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """Contact of bones with any amount of sliding. ``on``: the name of a region of facets, or a skin. The pressure depends on the
-    gap g, the signed distance (negative inside): zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k
-    g`` below -d. It is the slope of an energy per unit rest area that is twice differentiable. ``stiffness``: k [MPa/mm]; under
-    pressure p a surface penetrates by p / k.
+    """The law of contact with bones, with finite sliding.
 
-    ``relaxed``: two frame numbers between which an overlap at rest is removed gradually: at the first it causes no pressure, from
-    the second on it counts in full.
+    ``on``: the name of a region of facets, or a skin. The pressure depends on the gap g, the signed distance to a bone (negative
+    inside): it is zero beyond the ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` below -d. The pressure
+    is the slope of an energy per unit rest area that is twice differentiable. ``stiffness``: k [MPa/mm]; under the pressure p a
+    surface penetrates by at most p / k.
 
-    ``in_situ`` [mm], for a body under tension at rest: points that overlap a bone, or whose gap is within this distance, touch the
+    ``relaxed``: two frame numbers between which an overlap at rest is removed gradually. At the first frame the overlap causes no
+    pressure; from the second frame on it counts in full.
+
+    ``in_situ`` [mm], for a body under tension at rest: points that overlap a bone, or whose gap is at most this distance, touch the
     bone at rest, with the pressure that balances the tension (``effects.in_situ``). Later only changes of their gaps count.
 
-    ``friction``: the coefficient of Coulomb's law, None without friction. A point sticks to the bone by a spring of the stiffness
-    k, and slides at a traction of ``friction`` times the pressure.
+    ``friction``: the coefficient of Coulomb's law, None without friction. A point sticks to the bone by a spring of stiffness k,
+    and slides once its traction reaches ``friction`` times the pressure.
 
-    ``parts``: for several bodies solved as one, the name of each and the range of its points of the skin; forces are then also
-    reported by body.
+    ``parts``: for several bodies solved as one, the name of each body and the range of its points in the skin. Forces are then
+    reported for each body too.
     """
 
     on: str | Skin
@@ -61,37 +66,42 @@ class ContactLaw:
     parts: tuple[tuple[str, int, int], ...] = ()
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative with respect to the gap [MPa/mm]; NaN if the gap is NaN."""
+        """The pressure (n,) [MPa] at each ``gap`` (n,) [mm], and its derivative with respect to the gap; NaN if the gap is NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
 
     def gap(self, pressure: Floats) -> Floats:
-        """The gap (n,) [mm] at pressures (n,) [MPa], which are 0 or more."""
+        """The gaps (n,) [mm] that cause the ``pressure`` (n,) [MPa], which must not be negative."""
         k, d = self.stiffness, self.smoothing
         return np.where(pressure > k * d, -pressure / k, d - 2 * np.sqrt(d * pressure / k))
 
     def allowance(self, frame: float) -> float:
-        """The fraction of the overlap at rest that is subtracted at ``frame``."""
+        """The fraction of the overlap at rest that is subtracted from the overlap at ``frame``."""
         if self.relaxed is None:
             return float(self.in_situ is not None)
         return remaining(self.relaxed, frame)
 
 
 def remaining(relaxed: tuple[float, float], frame: float) -> float:
-    """The fraction of an overlap at rest that is left at ``frame`` if it is removed between two frame numbers."""
+    """The fraction of an overlap at rest that remains at ``frame`` if it is removed between the two frame numbers ``relaxed``."""
     first, last = relaxed
     return float(np.clip((last - frame) / (last - first), 0, 1))
 
 
 def penalty(gap: Floats, k: float, d: float) -> tuple[Floats, Floats]:
-    """The pressure (n,) [MPa] at gaps (n,) [mm] for a stiffness ``k`` [MPa/mm] and a smoothing ``d`` [mm], and its slope."""
+    """The pressure (n,) [MPa] at each ``gap`` (n,) [mm], and its derivative with respect to the gap [MPa/mm].
+
+    ``k``: the stiffness [MPa/mm]; ``d``: the smoothing [mm].
+    """
     near = np.where(gap > d, 0.0, d - gap)
     pressure = np.where(gap < -d, -k * gap, k * near**2 / (4 * d))
     return pressure, np.where(gap < -d, -k, -k * near / (2 * d))
 
 
 def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: float) -> Floats:
-    """The smallest gap (n,) [mm], negative inside, to a ``bone`` in its rest pose on straight ``paths`` (n, 3) [mm] from their
-    ``starts`` (n, 3) [mm], sampled at strides as long as the gap allows, at least ``least`` [mm].
+    """The smallest gap (n,) [mm], negative inside, between a ``bone`` in its rest pose and each of n straight paths.
+
+    ``starts`` (n, 3) [mm]: the first points of the paths; ``paths`` (n, 3) [mm]: the vectors from the first to the last points. The
+    gap is sampled at intervals that are as long as it allows, and at least ``least`` [mm] long.
     """
     smallest = np.full(len(starts), np.inf)
     lengths = np.linalg.norm(paths, axis=1)
@@ -108,7 +118,10 @@ def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: flo
 
 
 def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
-    """The least distance [mm] of ``points`` (n, 3) to a bone at rest; InputError if a point is in its middle."""
+    """The smallest signed distance [mm] of ``points`` (n, 3) to a ``bone`` at rest. ``name``: the name of the bone in messages.
+
+    Raises InputError if a point is so deep inside the bone that no side is nearest.
+    """
     nearest, half = float(bone.sample(points).distance.min(initial=np.inf)), bone.half_thickness
     if nearest < -_MIDDLE * half:
         got = f"{-nearest:.3g} mm of overlap with the muscle at rest"
@@ -118,7 +131,9 @@ def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
 
 
 def check_bone(place: str, surface: Surface, shape: Obstacle, muscle: Surface, apart: float) -> None:
-    """Raise InputError for a bone inside the muscle, which no force would move out, or too thin for points ``apart`` [mm]."""
+    """Raise InputError for a bone entirely inside the muscle, as no force would push it out, or a bone that is too thin for contact
+    points with a spacing of ``apart`` [mm].
+    """
     if signed_distances(surface.points, muscle).max() < 0:
         raise InputError(place, "a bone entirely inside the muscle", "a bone that is partly outside")
     if not shape.half_thickness >= _THINNEST * apart:
@@ -127,7 +142,7 @@ def check_bone(place: str, surface: Surface, shape: Obstacle, muscle: Surface, a
 
 
 def check_exempt(exempt: Exemption, place: str) -> None:
-    """Raise InputError if most of the unattached surface is exempt from contact; log a warning if much of it is exempt."""
+    """Raise InputError if most of the unattached surface is exempt from contact; log a warning if more than a quarter is exempt."""
     got = f"attachments within {exempt.reach:.2g} mm of {100 * exempt.lost:.0f} % of the unattached surface, without contact there"
     if not exempt.lost <= _LOST:
         raise InputError(place, got, f"at most {100 * _LOST:.0f} %: larger or fewer attachments, or no contact effect")

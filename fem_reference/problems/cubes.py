@@ -1,4 +1,4 @@
-"""Cubes of a material in a homogeneous state, as at a single material point: the stress follows from the effects' energies."""
+"""Cubes of a material in a homogeneous state, as at a single material point. The stress follows from the energies of effects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from fem_reference.foundations.jets import JET_FUNCTIONS, variables
 from fem_reference.foundations.mesh import Floats
 
 FREE = None  # an axis along which no stress acts
-# The allowed stress on free sides: a fraction of the greatest stress, plus, for rounding, a fraction of the bulk modulus.
+# The allowed stress on free sides: a fraction of the maximum stress, plus a fraction of the bulk modulus for rounding.
 _LEFT, _ROUNDING = 1e-8, 1e-13
 
 
@@ -29,7 +29,7 @@ class CubeState:
         return np.diag(self.F)
 
     def poisson_ratio(self, loaded: int, axis: int) -> float:
-        """Minus the logarithmic strain along ``axis``, divided by the strain along the axis ``loaded``."""
+        """Minus the logarithmic strain along ``axis``, divided by the logarithmic strain along the axis ``loaded``."""
         return float(-np.log(self.stretches[axis]) / np.log(self.stretches[loaded]))
 
 
@@ -42,10 +42,12 @@ def nominal_stress(acting: Sequence[Effect], F: Floats, fibre: Floats) -> Floats
 
 
 def loaded(acting: Sequence[Effect], stretches: Sequence[float | None], fibre: Floats) -> CubeState:
-    """The state of a cube at ``stretches`` along x, y and z, ``FREE`` along axes without stress; at least one stretch is given.
-    Fibres lie in the plane of x and y. If they are at an angle to the load, the cube is sheared (lines along y lean towards x)
-    until no shear stress acts. It is then in tension or compression along x alone, like material far from the plates of a testing
-    machine, which would prevent the shear. ArithmeticError if no such state is found.
+    """The state of a cube at ``stretches`` along x, y and z. A stretch is ``FREE`` along an axis without stress; at least one is
+    given.
+
+    The ``fibre`` direction is in the plane of x and y. If it is at an angle to the load, the cube is sheared (lines along y lean
+    towards x) until no shear stress acts. It is then in tension or compression along x alone, like material far from the plates of
+    a testing machine, which would prevent the shear. Raises ArithmeticError if no such state is found.
     """
     if not all(one is FREE or 0 < one < np.inf for one in stretches):
         raise InputError("stretches", stretches, "numbers above zero, or FREE")

@@ -1,4 +1,4 @@
-"""Checks of the fibre directions of a body, and of the normals about which laws turn fibres."""
+"""Checks of the fibre directions of a body, and of the normals about which laws rotate them."""
 
 import math
 
@@ -11,7 +11,7 @@ from fem_reference.geometry.fibres import Directions
 from fem_reference.problems.body import Body
 
 _UNIT = 1e-6  # the tolerance on the length of a unit vector
-_LEAST = 1.0  # the least angle [deg] between a normal and the fibres, whose directions are not exact in a mesh
+_LEAST = 1.0  # the minimum angle [deg] between a normal and the fibres, whose directions in a mesh are not exact
 
 
 def check_unit(fibre: Directions, places: Floats) -> None:
@@ -30,7 +30,7 @@ def check_unit(fibre: Directions, places: Floats) -> None:
 
 
 def check_normals(body: Body) -> None:
-    """Raise InputError if the ``normal`` of a law is along the fibres, so that no direction across both is defined."""
+    """Raise InputError if the ``normal`` of a law is along the fibres, so that no direction perpendicular to both is defined."""
     laws = [effect for effect in body.effects if isinstance(effect, HolzapfelOgden)]
     fibre = body.fibre
     if fibre is None or not laws:

@@ -1,4 +1,4 @@
-"""Estimates for a muscle case before it is solved, and the effects that they show to be needed."""
+"""Estimates for a muscle case before it is solved, and decisions on the effects that the case needs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -17,13 +17,13 @@ from fem_reference.problems.guess import Guess
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.scenes.muscle import MuscleCase
 
-# An effect that moves the surface less than this is negligible: a fraction of the size of tetrahedra, or of the greatest
-# displacement (travel) of the surface if that is less. Error bars of the surface (rms) are 0.03 to 0.14 of the size and 0.01 to
+# An effect is negligible if it moves the surface by less than this fraction of the size of tetrahedra, or of the maximum
+# displacement (travel) of the surface if this is smaller. Error bars of the surface (rms) are 0.03 to 0.14 of the size and 0.01 to
 # 0.05 of the travel; error bars of fibre lengths and volumes are smaller if only these change.
 TOLERANCE = 0.005
-# The negligible change of stress by an effect, relative to the stress of the others, and the least strain assumed for it.
+# The negligible change of stress by an effect, relative to the stress of the other effects, and the smallest strain assumed for it.
 STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
-# The error of the guessed position of a point, as a fraction of its path past a bone (0.83 in `hip_flexion`).
+# The assumed error of the guessed position of a point, as a fraction of its path past a bone (0.83 in `hip_flexion`).
 _DOUBT = 1.0
 # The numbers of sampled frames, evenly spread, and of sampled vertices.
 _FRAMES, _VERTICES = 9, 1500
@@ -35,9 +35,10 @@ _FELT = 1.0  # a distance [mm] from a bone that exceeds any smoothing of contact
 
 @dataclass(frozen=True)
 class Decision:
-    """The decision whether an effect is ``needed``, by its ``indicator`` (None for a part of the material) and the allowed values
-    ``bound`` [mm] and ``stress_bound`` [MPa]. ``turned_out``: the frame whose solution showed the need, None if estimates showed
-    it. ``listed``: the effect acts in any case. ``of``: the muscle in which it acts, if there are several.
+    """The decision whether an ``effect`` is ``needed``. ``indicator``: the estimates for the effect, None for a part of the
+    material; ``bound`` [mm], ``stress_bound`` [MPa]: their allowed values. ``turned_out``: the frame whose solution showed that the
+    effect is needed, None if estimates showed it. ``listed``: True if the effect acts whether it is needed or not. ``of``: the name
+    of the muscle if the effect acts in only one of several muscles, otherwise empty.
     """
 
     effect: Effect
@@ -51,7 +52,7 @@ class Decision:
 
     @property
     def title(self) -> str:
-        """The title of the effect, after the name of the muscle if it acts in only one of several."""
+        """The title of the effect, preceded by the name of the muscle if the effect acts in only one of several muscles."""
         return f"{self.of}: {self.effect.title}" if self.of else self.effect.title
 
     @property
@@ -78,7 +79,7 @@ class Decision:
 
     @property
     def _because(self) -> str:
-        """The quantities that decided: all above their allowed values, or all quantities if none is above."""
+        """The quantities that decided, in words: those above their allowed values, or both if neither is above."""
         assert self.indicator is not None
         estimate, stress, most = self.indicator.estimate, 1e3 * self.indicator.stress, 1e3 * self.stress_bound
         said = [
@@ -90,19 +91,21 @@ class Decision:
 
 
 def decisions(case: MuscleCase, rest: Setup) -> tuple[Decision, ...]:
-    """Decisions on each effect of a case, before it is solved."""
+    """The decision on each effect of a case before it is solved."""
     known, listed = estimates(case, rest), case.choice == "listed"
     return tuple(replace(decision(effect, effect.indicator(known), known), listed=listed) for effect in case.effects)
 
 
 def decision(effect: Effect, found: Indicator | None, known: Estimates) -> Decision:
-    """Decide whether an ``effect`` is needed, by its indicator ``found``."""
+    """Decide whether an ``effect`` is needed, from its indicator ``found`` and the tolerances in ``known``."""
     within = found is not None and found.estimate <= known.tolerance and found.stress <= known.stress_tolerance
     return Decision(effect, not within, found, known.tolerance, known.stress_tolerance)
 
 
 def solved(known: Estimates, rest: Setup, bones: tuple[Bone, ...], number: float, at: Floats) -> Estimates:
-    """The ``known`` estimates, updated with the surface ``at`` (n, 3) of a solved frame and its distance to ``bones``."""
+    """The ``known`` estimates, updated from a solved frame. ``number``: the frame number; ``at`` (n, 3): the positions of the
+    surface, whose nearness to ``bones`` is measured.
+    """
     chosen, felt = _chosen(rest), rest.exempt.places(_PLACES)
     points, moved = rest.surface.points[chosen], at[chosen]
     return replace(
@@ -119,7 +122,7 @@ def _chosen(rest: Setup) -> Ints:
 
 
 def estimates(case: MuscleCase, rest: Setup) -> Estimates:
-    """Estimates of a case for its effects, from a guessed motion of the surface in which each point follows the nearest bones."""
+    """Estimates for a case from a guessed motion of the surface, in which each point follows the nearest bones."""
     instants = np.unique(np.linspace(0, len(case.numbers) - 1, _FRAMES).round().astype(int))
     frames, chosen = [case.numbers[i] for i in instants], _chosen(rest)
     points, places = rest.surface.points[chosen], rest.exempt.places(_PLACES) @ rest.surface.points
@@ -160,7 +163,7 @@ def _instants(case: MuscleCase) -> tuple[float, ...]:
 
 
 def _shear(case: MuscleCase, rest: Setup) -> float:
-    """The shear modulus at rest [MPa] of the stored energies, without fibres, at the softest point if regions differ."""
+    """The shear modulus at rest [MPa] of the stored energies without fibres, at the softest point if there are regions."""
     stored = [one for one in case.effects if isinstance(one, Energy) and one.stored and not isinstance(one, Ramped)]
     laws = [(one, 1.0) for one in stored]
     isotropic = [(one, 1.0) for one in stored if not one.needs]
@@ -173,7 +176,7 @@ def _shear(case: MuscleCase, rest: Setup) -> float:
 
 
 def _tension(case: MuscleCase) -> float:
-    """The stress [MPa] of all fibres at their rest length, averaged over the frames, without fibres that act in regions only."""
+    """The stress [MPa] of all fibres at their rest length, averaged over the frames. Fibres that act in a region do not count."""
     pulling = [one for one in case.effects if isinstance(one, Energy) and one.stored and "fibre" in one.needs]
     pulling = [one for one in pulling if not one.region]
     return sum(
@@ -183,14 +186,14 @@ def _tension(case: MuscleCase) -> float:
 
 
 def _taut(case: MuscleCase) -> float:
-    """The greatest stretch of fibres at rest, over the frames."""
+    """The maximum stretch of fibres at rest over all frames, due to prestrains."""
     rest = State(F=np.eye(3).tolist(), fibre=(1.0, 0.0, 0.0))
     acting = ([(one, one.amount(frame)) for one in case.effects] for frame in _instants(case))
     return float(max(elastic_state(some, rest).F[0][0] for some in acting))
 
 
 def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
-    """The expected range of fibre stretch: from the line between attachments, and from bending as the bones turn."""
+    """The smallest and the greatest expected fibre stretch, from the line between attachments and the bending by rotating bones."""
     if len(rest.attached) < 2:
         return 1.0, 1.0
     length, half = guess.length_of(rest), guess.thickness_of(rest) / 2
@@ -202,8 +205,8 @@ def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
 
 
 def stretched(rest: Setup, positions: Floats) -> tuple[float, float]:
-    """The smallest and the greatest stretch of the surface, at ``positions`` (n, 3), along the line between its attachments. A
-    hundredth of the surface's area at either extreme is left out, as it may consist of single triangles at a rim.
+    """The smallest and the greatest stretch of the surface, at ``positions`` (n, 3), along the line between its attachments. At
+    each extreme, a hundredth of the surface's area is left out, as it may consist of single triangles at a rim.
     """
     if len(rest.attached) < 2:
         return 1.0, 1.0
@@ -219,7 +222,9 @@ def stretched(rest: Setup, positions: Floats) -> tuple[float, float]:
 
 
 def _near(bone: Bone, points: Floats, moved: Mapping[int, Floats] | Mapping[float, Floats], doubt: float) -> Near:
-    """The gap of ``moved`` ``points`` (n, 3) to a ``bone``; ``doubt``: its greatest error, as a fraction of the path past it."""
+    """The nearness of ``points`` (n, 3) to a ``bone``. ``moved``: their positions (n, 3) at each frame; ``doubt``: the maximum
+    error of these positions, as a fraction of the path of each point past the bone.
+    """
     low, high = bone.surface.points.min(axis=0), bone.surface.points.max(axis=0)
     local = np.stack([apply(np.linalg.inv(bone.pose(frame)), at) for frame, at in moved.items()])
     off = doubt * np.linalg.norm(local - points, axis=2)

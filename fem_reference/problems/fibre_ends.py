@@ -1,4 +1,4 @@
-"""The ends of a muscle's fibres: the attachment to which each end belongs, the distance between the two, and the area covered."""
+"""The ends of a muscle's fibres: their attachments, their distances from the attachments, and the areas that they cover."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,17 +12,21 @@ from fem_reference.geometry.distance import Distances, distances
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.problems.setup import AttachedVertices
 
-# The greatest distance [mm] at which an end counts as reaching its attachment: the muscle there practically moves with the bone.
+# The maximum distance [mm] at which an end counts as reaching its attachment. So near to it, the muscle practically moves with the
+# bone.
 REACHES = 2.0
 SIDES = ("first", "last")  # the ends of a fibre
 
 
 @dataclass(frozen=True, eq=False)
 class FibreEnds:
-    """The first and the last end of k fibres. ``by`` (k, 2): the index in ``attached`` of the attachment of each end. ``distance``
-    (k, 2) [mm]: its distance from the attached area at rest; ``closest`` (k, 2, 3) [mm]: the closest point of this area.
-    ``covered`` (a,): the fraction of each attachment's area that is nearer than the mean fibre spacing, sqrt(area / k), to an end
-    that belongs to it. If an end does not reach its attachment, the fibre continues as the attachment's tendon, if there is one.
+    """The first and the last end of each of k fibres.
+
+    ``attached``: the a attachments of the muscle. ``by`` (k, 2): the index in ``attached`` of the attachment to which each end
+    belongs. ``distance`` (k, 2) [mm]: the distance of each end from its attached area at rest; ``closest`` (k, 2, 3) [mm]: the
+    closest point of this area. ``covered`` (a,): the fraction of the area of each attachment that is nearer than the mean fibre
+    spacing, sqrt(area / k), to an end that belongs to it. An end that does not reach its attachment continues as the tendon of the
+    attachment, if it has one.
     """
 
     attached: tuple[AttachedVertices, ...]
@@ -33,7 +37,7 @@ class FibreEnds:
 
     @cached_property
     def tendons(self) -> Floats:
-        """The points (k, 2, 3) [mm] of bones at rest to which ends continue as tendons; NaN if they do not."""
+        """The points (k, 2, 3) [mm] of bones at rest to which ends continue as tendons; NaN for an end without a tendon."""
         points = np.array([np.full(3, np.nan) if one.tendon is None else one.tendon for one in self.attached])
         return np.where((self.distance > REACHES)[:, :, None], points[self.by], np.nan)
 
@@ -43,29 +47,41 @@ class FibreEnds:
         return np.asarray((self.distance > REACHES) & np.isnan(self.tendons[:, :, 0]))
 
     def taken(self, rest: Floats, frame: float) -> Floats:
-        """The positions (k, 2, 3) [mm] of ends at ``rest`` (k, 2, 3) [mm] moved with their bones to a ``frame``."""
+        """The positions (k, 2, 3) [mm] at a ``frame`` of points that move with the bones of the ends.
+
+        ``rest`` (k, 2, 3) [mm]: the rest positions of these points.
+        """
         found = np.array(rest)
         for i, one in enumerate(self.attached):
             found[self.by == i] = apply(one.bone.pose(frame), rest[self.by == i])
         return found
 
     def off(self, ends: Floats, rest: Floats, frame: float) -> Floats:
-        """Distances (k, 2) [mm] of ``ends`` (k, 2, 3) [mm] at a ``frame`` from the ends at ``rest`` moved with their bones."""
+        """The distances (k, 2) [mm] between ``ends`` (k, 2, 3) [mm] at a ``frame`` and the positions that they would have if they
+        moved with their bones from ``rest`` (k, 2, 3) [mm].
+        """
         return np.asarray(np.linalg.norm(ends - self.taken(rest, frame), axis=2))
 
     def beyond(self, ends: Floats, frame: float) -> Floats:
-        """Lengths (k,) [mm] of the straight tendons of each fibre from its ``ends`` (k, 2, 3) [mm] at a ``frame``; 0 for none."""
+        """The lengths (k,) [mm] of the straight tendons of each fibre at a ``frame``, with both ends added; 0 without tendons.
+
+        ``ends`` (k, 2, 3) [mm]: the ends of the fibres at this frame.
+        """
         lengths = np.linalg.norm(self.taken(self.tendons, frame) - ends, axis=2)
         return np.asarray(np.where(np.isnan(self.tendons[:, :, 0]), 0.0, lengths).sum(axis=1))
 
     def named(self, fibre: int, side: int) -> str:
-        """The name of an end in messages."""
-        how = "continued to {} by a tendon" if np.isfinite(self.tendons[fibre, side, 0]) else "which belongs to {}"
+        """A description of the end on a ``side`` (0 or 1) of a ``fibre``, for messages."""
+        how = (
+            "which continues to {} as a tendon" if np.isfinite(self.tendons[fibre, side, 0]) else "which belongs to {}"
+        )
         return f"{SIDES[side]} end of fibre {fibre}, {how.format(self.attached[self.by[fibre, side]].attachment)}"
 
     @cached_property
     def facts(self) -> dict[str, float | str]:
-        """The numbers of all ends, of ends with a tendon, and of ends beside their attachment (named); the covered areas [%]."""
+        """Facts about the ends, by name: the number of ends, the ends with a tendon, the ends that neither reach their attachment
+        nor continue as a tendon, and the covered area of each attachment [%].
+        """
         tied = np.isfinite(self.tendons[:, :, 0])
         found: dict[str, float | str] = {
             "fibre_ends": float(self.by.size),
@@ -81,19 +97,21 @@ class FibreEnds:
         return found
 
     def _words(self, mask: Bools) -> str:
-        """The ends of a ``mask`` (k, 2), each with its distance from its attached area."""
+        """The ends in a ``mask`` (k, 2) in words, each with its distance from its attached area."""
         named = ((self.named(*end), self.distance[*end]) for end in np.argwhere(mask).tolist())
         return "; ".join(f"{name}: {far:.1f} mm from the attached area" for name, far in named)
 
 
 def ends_of(lines: Polylines, points: Floats | None = None) -> Floats:
-    """The first and the last points (k, 2, 3) of ``lines`` at rest, or with their ``points`` (n, 3) given."""
+    """The first and the last point (k, 2, 3) of each of the ``lines``, at rest or with their ``points`` (n, 3) at another frame."""
     at = lines.points if points is None else points
     return np.stack([at[lines.offsets[:-1]], at[lines.offsets[1:] - 1]], axis=1)
 
 
 def facts_of(lines: Polylines, ends: FibreEnds | None) -> dict[str, float | str]:
-    """The mean length of ``lines`` at rest with the straight tendons of their ``ends`` [mm], and the facts on these ends."""
+    """Facts about fibres: the mean length [mm] of ``lines`` at rest, including the straight tendons of their ``ends``, and the
+    facts about these ends.
+    """
     if ends is None:
         return {"fibre_length_mean_mm": float(lines.lengths().mean())}
     tendons = np.linalg.norm(ends.tendons - ends_of(lines), axis=2)
@@ -101,11 +119,11 @@ def facts_of(lines: Polylines, ends: FibreEnds | None) -> dict[str, float | str]
 
 
 def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fibres: Polylines) -> FibreEnds | None:
-    """The ends of the ``fibres`` of a muscle from its attachments and their parts exempt from contact; None without attachments.
+    """The ends of the ``fibres`` of a muscle and their attachments; None without attachments. ``exempt``: the attached areas.
 
-    A fibre runs from bone to bone: its ends belong to the pair of attachments to two bones with the least sum of distances. So the
-    two ends of a short fibre beside its origin do not both belong to the origin. If all attachments are to one bone, each end
-    belongs to the nearest attachment.
+    A fibre is assumed to run from bone to bone: its ends belong to the pair of attachments, on two bones, with the smallest sum of
+    distances. The two ends of a short fibre near its origin therefore do not both belong to the origin. If all attachments are on
+    one bone, each end belongs to the nearest attachment.
     """
     if not attached:
         return None
@@ -125,9 +143,9 @@ def attached_ends(attached: tuple[AttachedVertices, ...], exempt: Exemption, fib
 
 
 def completed(lines: Polylines, ends: FibreEnds) -> Polylines:
-    """The ``lines``, with lines that end beside their attachment extended to its closest point in straight steps of at most 2 mm.
+    """The ``lines``, in which each end that misses its attachment is extended straight to the closest point of the attachment.
 
-    An extension may leave the muscle; the caller moves its points back inside.
+    The extension has steps of at most 2 mm. It may leave the muscle; the caller moves its points back inside.
     """
     parts = []
     for i, (first, last) in enumerate(ends.beside):
@@ -139,12 +157,14 @@ def completed(lines: Polylines, ends: FibreEnds) -> Polylines:
 
 
 def _steps(start: Floats, end: Floats) -> Floats:
-    """Points (n, 3) [mm], evenly spaced, from ``start``, which is left out, to ``end``."""
+    """Evenly spaced points (n, 3) [mm] from ``start``, which is not included, to ``end``."""
     return np.linspace(start, end, int(np.ceil(np.linalg.norm(end - start) / REACHES)) + 1)[1:]
 
 
 def _covered(part: Floats, ends: Floats, fibres: int) -> float:
-    """The fraction of the area of triangles ``part`` (r, 3, 3) with centroids within the mean fibre spacing of ``ends`` (m, 3)."""
+    """The fraction of the area of the triangles ``part`` (r, 3, 3) that is covered by ``ends`` (m, 3): their centroids are within
+    the mean spacing of the fibres from an end. ``fibres``: the number of fibres.
+    """
     areas = corner_areas(part)
     if len(ends) == 0 or not areas.sum():
         return 0.0
@@ -153,6 +173,6 @@ def _covered(part: Floats, ends: Floats, fibres: int) -> float:
 
 
 def _nearest(exempt: Exemption, i: int, ends: Floats) -> Distances:
-    """The closest points of the area of attachment ``i`` to ``ends`` (k, 2, 3), end by end (2 k,)."""
+    """The distances of all ``ends`` (k, 2, 3) from the area of attachment ``i`` and the closest points of this area, (2 k,)."""
     part = exempt.part[exempt.by == i]
     return distances(ends.reshape(-1, 3), Surface(part.reshape(-1, 3), np.arange(3 * len(part)).reshape(-1, 3)))

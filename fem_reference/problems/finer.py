@@ -1,4 +1,4 @@
-"""Bodies on finer cells: each cell is cut into eight parts of half its size, with the same volume and regions."""
+"""Bodies with finer cells: each cell is cut into eight parts of half its size. The volume and the regions remain the same."""
 
 from dataclasses import dataclass, replace
 from itertools import product
@@ -12,13 +12,13 @@ from fem_reference.geometry.nested import EDGES, PARTS
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Kind, facet_corners, reference_nodes
 
-# The weights (shares) of a cell's corners in the nodes of its parts are multiples of 1 over this number.
+# The weights (shares) of the corners of a cell at the nodes of its parts are integer multiples of 1 / _SHARES.
 _SHARES = 64
 
 
 @dataclass(frozen=True, eq=False)
 class OfParts:
-    """The fibre directions in the parts of cells, eight successive parts per cell, taken from the cells."""
+    """The fibre directions in the parts of cells, taken from the cells. Each cell has eight successive parts."""
 
     fibre: Directions
 
@@ -28,8 +28,8 @@ class OfParts:
 
 
 def finer(body: Body) -> tuple[Body, Ints]:
-    """The ``body`` with each cell cut into eight, and the number (n,) in the new body of each point of ``body``, -1 for a point of
-    no cell. The shape of the coarser cells remains: no surface becomes smoother.
+    """The ``body`` with each cell cut into eight, and the index (n,) in the finer mesh of each point of the coarser mesh, -1 for a
+    point that belongs to no cell. The shape of the coarser cells is preserved: no surface becomes smoother.
     """
     mesh, shared = _cut(body.mesh)
 
@@ -46,7 +46,7 @@ def finer(body: Body) -> tuple[Body, Ints]:
 
 
 def _cut(mesh: Cells) -> tuple[Cells, Ints]:
-    """The mesh with its cells cut into eight, and the number (n,) of each point of ``mesh`` in it."""
+    """The finer mesh, in which each cell of ``mesh`` is cut into eight, and the index (n,) in it of each point of ``mesh``."""
     own = reference_nodes(mesh.kind, mesh.degree)
     nodes = _linear(mesh.kind, own) @ _parts(mesh.kind)  # (8, k, 3), in the reference cell
     shares = np.rint(_SHARES * _linear(mesh.kind, nodes)).astype(np.int64)  # (8, k, c)
@@ -63,31 +63,35 @@ def _cut(mesh: Cells) -> tuple[Cells, Ints]:
 
 
 def _parts(kind: Kind) -> Floats:
-    """The corners (8, c, 3) of the parts of the reference cell, each of positive volume."""
+    """The corners (8, c, 3) of the parts of the reference cell. All parts have positive volume."""
     corners = reference_nodes(kind, 1)
     if kind == "hexahedron":
         return np.stack([(corners + low) / 2 for low in product((0, 1), repeat=3)])
     ten = np.concatenate([corners, corners[EDGES].mean(axis=1)])
-    parts = ten[PARTS[2]]  # four at the corners, four around the line from the middle of edge 03 to that of 12
+    parts = ten[
+        PARTS[2]
+    ]  # four at the corners, four around the line from the midpoint of edge 03 to the midpoint of edge 12
     wrong = np.linalg.det(parts[:, 1:] - parts[:, :1]) < 0
     return np.asarray(np.where(wrong[:, None, None], parts[:, [1, 0, 2, 3]], parts))
 
 
 def _linear(kind: Kind, places: Floats) -> Floats:
-    """The linear shape functions (..., c) of the corners at ``places`` (..., 3) of the reference cell."""
+    """The values (..., c) of the linear shape functions of the corners at ``places`` (..., 3) of the reference cell."""
     return _shape(kind, 1, places.reshape(-1, 3)).reshape(*places.shape[:-1], -1)
 
 
 def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
-    """The shape functions (q, k) of the nodes at ``places`` (q, 3) of the reference cell."""
+    """The values (q, k) of the shape functions of the nodes at ``places`` (q, 3) of the reference cell."""
     powers = np.array([p for p in product(range(degree + 1), repeat=3) if kind == "hexahedron" or sum(p) <= degree])
     nodes, points = ((some[:, None, :] ** powers).prod(axis=2) for some in (reference_nodes(kind, degree), places))
     return np.asarray(np.linalg.solve(nodes.T, points.T).T)
 
 
 def _named(corners: Ints, shares: Ints) -> tuple[Ints, Ints]:
-    """The number (m, 8, k) of each node of the parts of cells with ``corners`` (m, c), and the first index of each node. Nodes with
-    equal ``shares`` (8, k, c) of the same corners are one node.
+    """The index (m, 8, k) of each node of the parts in the finer mesh, and the first occurrence of each index.
+
+    ``corners`` (m, c): the corners of the cells; ``shares`` (8, k, c): the weights of the corners at the nodes of the parts. Nodes
+    with equal weights of the same corners are one node.
     """
     some = np.where(shares > 0, corners[:, None, None], -1)
     order = np.argsort(some, axis=-1)
@@ -98,7 +102,7 @@ def _named(corners: Ints, shares: Ints) -> tuple[Ints, Ints]:
 
 
 def _facets(mesh: Cells, names: Ints, shares: Ints) -> dict[str, Ints]:
-    """The regions on the parts: the facets of the parts that lie on a facet of the region."""
+    """The regions of the finer mesh: for each region, those facets of the parts that lie on a facet of the region."""
     sides = facet_corners(mesh.kind)
     every = np.arange(shares.shape[-1])
     parts = []  # for each side, the facets (part, corners of the part) that lie on it
@@ -116,7 +120,7 @@ def _facets(mesh: Cells, names: Ints, shares: Ints) -> dict[str, Ints]:
 
 
 def _in_parts(skin: Skin, mesh: Cells) -> Skin:
-    """The skin with each point in the nearest part of its cell; in straight tetrahedra by barycentric coordinates."""
+    """The ``skin`` with each point in the nearest part of its cell, found by barycentric coordinates in straight tetrahedra."""
     corners = mesh.points[mesh.cells[skin.cells, :4]]
     places, parts = barycentric(skin.points, corners)[:, 1:], _parts("tetrahedron")
     inside = np.linalg.solve(edge_vectors(parts)[None], (places[:, None] - parts[None, :, 0])[..., None])

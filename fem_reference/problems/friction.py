@@ -11,8 +11,8 @@ from fem_reference.foundations.mesh import Floats
 
 
 def check(coefficients: Iterable[float | None], *, begun: bool) -> None:
-    """Raise InputError if a coefficient of friction is neither None nor above 0, or if a body with friction has ``begun`` deformed
-    or under tension. The positions to which its points stick are then unknown.
+    """Raise InputError if a coefficient of friction is neither None nor above 0, or if a body with friction starts deformed or
+    under tension (``begun``), because the positions to which its points stick are then unknown.
     """
     for one in (one for one in coefficients if one is not None):
         if not (isfinite(one) and one > 0):
@@ -22,8 +22,9 @@ def check(coefficients: Iterable[float | None], *, begun: bool) -> None:
 
 
 class Returned(NamedTuple):
-    """The traction of n points divided by their elastic slip, ``stiffness`` (n,) [MPa/mm], and its derivatives with respect to the
-    length of the elastic slip, ``by_slip`` (n,), and to the limit of the traction, ``by_limit`` (n,).
+    """The secant stiffness of friction at n points. ``stiffness`` (n,) [MPa/mm]: the traction divided by the elastic slip.
+    ``by_slip`` (n,), ``by_limit`` (n,): the derivatives of ``stiffness`` with respect to the length of the elastic slip and to the
+    limit of the traction.
     """
 
     stiffness: Floats
@@ -32,8 +33,9 @@ class Returned(NamedTuple):
 
 
 def returned(slip: Floats, limit: Floats, stiffness: float) -> Returned:
-    """The traction of a spring of ``stiffness`` k [MPa/mm] at an elastic ``slip`` s (n,) [mm], up to a ``limit`` L (n,) [MPa]:
-    ``min(k s, L)``, by return mapping (Giannakopoulos 1989, doi 10.1016/0045-7949(89)90175-4).
+    """The traction ``min(k s, L)`` of friction by return mapping (Giannakopoulos 1989, doi 10.1016/0045-7949(89)90175-4).
+
+    ``slip``: the elastic slip s (n,) [mm]; ``limit``: the limit L (n,) [MPa] of the traction; ``stiffness``: k [MPa/mm].
 
     >>> returned(np.array([0.1, 0.3]), np.array([0.4, 0.4]), 2.0).stiffness * [0.1, 0.3]
     array([0.2, 0.4])
@@ -45,8 +47,9 @@ def returned(slip: Floats, limit: Floats, stiffness: float) -> Returned:
 
 
 def since_entry(gap: Floats, before: Floats, felt: float) -> tuple[Floats, Floats]:
-    """The fraction (n,) of a straight path that lies within contact, and its derivative (n,) with respect to ``gap``. The gap
-    decreases from ``before`` (n,) [mm], at least ``felt`` [mm], to ``gap`` (n,) [mm], below ``felt``.
+    """The fraction (n,) of each of n straight paths that lies within contact, and its derivative (n,) with respect to ``gap``.
+
+    The gap decreases from ``before`` (n,) [mm], which is at least ``felt`` [mm], to ``gap`` (n,) [mm], which is below ``felt``.
     """
     whole = before - gap
     return (felt - gap) / whole, (felt - before) / whole**2

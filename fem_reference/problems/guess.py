@@ -1,4 +1,4 @@
-"""Guesses, before a solution, of the path of a muscle from the motion of its bones, and of its shape as a beam."""
+"""Guesses of the path of a muscle, from the motion of its bones, and of its shape as a beam, before it is solved."""
 
 from dataclasses import dataclass, replace
 
@@ -14,9 +14,10 @@ from fem_reference.problems.setup import Bone, Setup
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """A guess of the path of ``points`` (n, 3), which follow ``bones`` with ``weights`` (n, b). The weights are the inverse
-    distances to the attachments of each bone, so the muscle between two attachments stays straight, as under tension. If nothing
-    is attached, the weights are the inverse distances to the bones.
+    """A guess of the path of ``points`` (n, 3), which follow ``bones`` with ``weights`` (n, b). There is a bone for each
+    attachment. The weights are in proportion to the inverse distances from the attachments, so that the muscle between two
+    attachments remains straight, as under tension. If nothing is attached, the weights are in proportion to the inverse distances
+    from the bones.
     """
 
     points: Floats
@@ -25,7 +26,7 @@ class Guess:
 
     @classmethod
     def of(cls, points: Floats, rest: Setup) -> "Guess":
-        """The guess for a muscle."""
+        """The guess for ``points`` of the muscle with the set-up ``rest``."""
         if rest.attached:
             away = [cKDTree(rest.surface.points[entry.vertices]).query(points)[0] for entry in rest.attached]
         else:
@@ -46,8 +47,9 @@ def distance(bone: Bone, points: Floats) -> Floats:
 
 
 def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float, float, float, float]:
-    """The greatest speed, speed perpendicular to an ``axis`` (3,), jump in velocity, and acceleration of a guess, per frame number;
-    each is a root mean square over its points. A jump is a change of velocity much greater than at most frames.
+    """The maximum speed, speed perpendicular to an ``axis`` (3,), jump in velocity, and acceleration of a ``guess``, in this order,
+    per frame number. Each is a root mean square over the points. A jump is a change of velocity that is much greater than the
+    changes at most frames.
     """
     some = slice(None, None, max(1, len(guess.points) // 100))
     guess = replace(guess, points=guess.points[some], weights=guess.weights[some])
@@ -61,8 +63,8 @@ def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float,
 
 
 def strain(points: Floats, moved: Floats) -> float:
-    """The strain of ``points`` (n, 3) at ``moved`` (n, 3): the residual of the best rigid motion (Kabsch 1976,
-    doi 10.1107/S0567739476001873), root mean square, divided by the root mean square distance from the middle; 1 at most.
+    """The strain of ``points`` (n, 3) that move to ``moved`` (n, 3), at most 1: the root-mean-square residual of the best rigid
+    motion (Kabsch 1976, doi 10.1107/S0567739476001873), divided by the root-mean-square distance from the centroid.
     """
     rest, now = points - points.mean(axis=0), moved - moved.mean(axis=0)
     left, _, right = np.linalg.svd(now.T @ rest)
@@ -71,17 +73,20 @@ def strain(points: Floats, moved: Floats) -> float:
 
 
 def rms(vectors: Floats) -> Floats:
-    """The root mean square of ``vectors`` (n, 3), or (f,) of (f, n, 3), over n."""
+    """The root mean square length of ``vectors`` (n, 3) over n; for vectors (f, n, 3), an array (f,)."""
     return np.asarray(np.sqrt((vectors**2).sum(axis=-1).mean(axis=-1)))
 
 
 def centres(rest: Setup) -> list[Floats]:
-    """The middle (3,) [mm] of each attachment at rest."""
+    """The mean (3,) [mm] of the vertices of each attachment at rest."""
     return [rest.surface.points[entry.vertices].mean(axis=0) for entry in rest.attached]
 
 
 def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
-    """The distance (f,) [mm] between the middles of the first and the last attachment, by frame; empty without two attachments."""
+    """The distances (f,) [mm] between the centres of the first and the last attachment at frame ``numbers``.
+
+    The array is empty if there are fewer than two attachments.
+    """
     if len(rest.attached) < 2:
         return np.zeros(0)
     middles = centres(rest)
@@ -90,7 +95,7 @@ def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
 
 
 def described_motion(rest: Setup) -> str:
-    """The effect of the bones' motion on the muscle, in a sentence; empty if the muscle is not attached twice."""
+    """The influence of the bones' motion on the length of the muscle, in words; empty if there are fewer than two attachments."""
     lengths = spans(rest, rest.frames)
     if not len(lengths):
         return ""
@@ -102,7 +107,7 @@ def described_motion(rest: Setup) -> str:
 
 
 def axis_of(rest: Setup) -> Floats:
-    """The direction (3,) from the first attachment to the last; 0 without two attachments."""
+    """The unit vector (3,) from the first attachment to the last; 0 if there are fewer than two attachments."""
     if len(rest.attached) < 2:
         return np.zeros(3)
     middles = centres(rest)
@@ -110,8 +115,9 @@ def axis_of(rest: Setup) -> Floats:
 
 
 def sag(rest: Setup, frames: list[int], travel: float) -> float:
-    """The deviation [mm] of the axis from the straight line between two attachments. It is the sum of the deviation at rest in the
-    middle third, that due to rotating bones, and 1/20 of the travel (a sideways shift bends the axis into two stiffer waves).
+    """The deviation [mm] of the muscle's axis from the straight line between two attachments. It is the sum of three parts: the
+    deviation at rest in the middle third, the deviation due to rotating bones, and 1/20 of the ``travel`` [mm] (a sideways shift
+    bends the axis into two stiffer waves).
     """
     if len(rest.attached) < 2:
         return 0.0
@@ -124,13 +130,13 @@ def sag(rest: Setup, frames: list[int], travel: float) -> float:
 
 
 def turn(rest: Setup, frame: float) -> float:
-    """The angle [rad] between the first and the last attached bone at a frame, relative to rest."""
+    """The rotation [rad] of the last attached bone relative to the first attached bone at a ``frame``, since rest."""
     first, last = (rest.attached[i].bone.pose(frame)[:3, :3] for i in (0, -1))
     return float(Rotation.from_matrix(first.T @ last).magnitude())
 
 
 def length_of(rest: Setup) -> float:
-    """The length [mm] from the first attachment to the last, or of the entire muscle without two attachments."""
+    """The length [mm] from the first attachment to the last, or of the entire muscle if there are fewer than two attachments."""
     middles = centres(rest) or [np.zeros(3)]
     return float(np.linalg.norm(middles[0] - middles[-1])) or diagonal(rest.surface.points)
 

@@ -1,4 +1,4 @@
-"""Several bodies joined into one, each a separate piece of its mesh; the pieces may be in contact."""
+"""Several bodies joined into one body, each as a separate piece of its mesh. The pieces may be in contact."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -24,7 +24,9 @@ Range = tuple[int, int]
 
 @dataclass(frozen=True)
 class Span:
-    """The slices of joined arrays for one muscle: vertices of the surface, points of fibres, points of the mesh, and cells."""
+    """The slices of the joined arrays that belong to one muscle: ``vertices`` of the surface, points of ``fibres``, ``points`` of
+    the mesh, and ``cells``.
+    """
 
     name: str
     vertices: slice
@@ -34,13 +36,15 @@ class Span:
 
 
 def called(piece: str, name: str) -> str:
-    """The name, in the joined body, of the part that has a ``name`` in its ``piece``."""
+    """The name, in the joined body, of the part that is called ``name`` in the body ``piece``."""
     return f"{piece} {name}"
 
 
 @dataclass(frozen=True, eq=False)
 class DirectionsByPiece:
-    """The fibre directions of the pieces at ``ranges`` of cells; along x in pieces without fibre directions."""
+    """The fibre directions in a joined body. ``ranges``: the range of cells of each piece; ``of``: the fibre directions of each
+    piece, None for a piece without fibres, in which the direction is along x.
+    """
 
     ranges: tuple[Range, ...]
     of: tuple[Directions | None, ...]
@@ -57,21 +61,23 @@ class DirectionsByPiece:
 
 @dataclass(frozen=True, eq=False)
 class Share:
-    """The share of points in a ``region``, or outside it; 1 if no region is named."""
+    """The share of points in a ``region``, or outside the region if ``outside`` is True; 1 everywhere if ``region`` is None."""
 
     region: Region | None = None
     outside: bool = False
 
     def __call__(self, points: Floats) -> Floats:
-        """The shares (n,)."""
+        """The shares (n,) of ``points`` (n, 3)."""
         if self.region is None:
             return np.ones(len(points))
         return 1 - self.region(points) if self.outside else self.region(points)
 
 
 def join(bodies: Mapping[str, Body], touching: tuple[Touching, ...] = ()) -> Body:
-    """The body joined from ``bodies`` by name, with contact ``touching`` between facets of the joined body. Effects that all bodies
-    have act everywhere; other effects act in the cells of their bodies. InputError if bodies differ in shared properties.
+    """Join ``bodies``, by name, into one body. ``touching``: the laws of contact between facets of the joined body.
+
+    Effects that all bodies have act everywhere; any other effect acts in the cells of its body. Raises InputError if the bodies
+    differ in properties that they must share.
     """
     ends = np.cumsum([0, *(len(one.mesh.cells) for one in bodies.values())]).tolist()
     ranges = {name: (first, last) for name, first, last in zip(bodies, ends, ends[1:], strict=False)}
@@ -104,7 +110,7 @@ def join(bodies: Mapping[str, Body], touching: tuple[Touching, ...] = ()) -> Bod
 
 
 def _frames(bodies: Mapping[str, Body], touching: tuple[Touching, ...]) -> tuple[float, ...]:
-    """The frames of the bodies, from the earliest start of the removal of an overlap at rest."""
+    """The frames of the joined body, beginning with the earliest frame at which the removal of an overlap at rest begins."""
     found = min((one.frames for one in bodies.values()), key=lambda frames: frames[0])
     begin = min((law.relaxed[0] for law in touching if law.relaxed is not None), default=found[0])
     return (begin, *found) if begin < found[0] else found
@@ -113,7 +119,7 @@ def _frames(bodies: Mapping[str, Body], touching: tuple[Touching, ...]) -> tuple
 def _acting(
     bodies: Mapping[str, Body], ranges: Mapping[str, Range]
 ) -> tuple[tuple[Effect, ...], dict[str, Region], dict[str, Range]]:
-    """The effects of all bodies, and the regions in which effects of one body act, with their ranges of cells."""
+    """The effects of the joined body, the regions in which effects of a single body act, and the range of cells of each region."""
     effects, regions, within = list[Effect](), dict[str, Region](), dict[str, Range]()
     for name, body in bodies.items():
         for effect in body.effects:
@@ -149,7 +155,7 @@ def _check_pressure(bodies: Mapping[str, Body]) -> None:
 
 
 def _prescribed(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> Iterator[Prescribed]:
-    """All prescribed displacements, with their names in the joined body."""
+    """Yield all prescribed displacements, with their names in the joined body."""
     for name, body in bodies.items():
         for entry in body.prescribed:
             on = called(name, entry.on) if isinstance(entry.on, str) else _moved(entry.on, ranges[name][0])
@@ -157,12 +163,12 @@ def _prescribed(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> Iter
 
 
 def _moved(skin: Skin, first: int) -> Skin:
-    """The ``skin`` with ``first`` added to its cell numbers."""
+    """The ``skin`` with ``first`` added to the indices of its cells."""
     return replace(skin, cells=skin.cells + first)
 
 
 def _contact(bodies: Mapping[str, Body], ranges: Mapping[str, Range]) -> ContactLaw | None:
-    """The contact of all bodies with bones, on the points of all bodies; None without contact."""
+    """The law of contact of the joined body with bones, with the points of all bodies; None without contact."""
     laws: dict[str, Any] = {name: one.contact for name, one in bodies.items() if one.contact is not None}
     if not laws:
         return None

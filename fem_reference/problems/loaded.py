@@ -26,13 +26,15 @@ def check(body: Body) -> None:
 
 
 def _exact(body: Body) -> list[tuple[Prescribed, Ints]]:
-    """The exact prescribed displacements of a body, each with its facets (f, 3 or 4)."""
+    """The exactly prescribed displacements of a body, each with its facets (f, 3 or 4)."""
     entries = [(entry, entry.on) for entry in body.prescribed if entry.stiffness is None]
     return [(entry, body.mesh.facets[on]) for entry, on in entries if isinstance(on, str)]
 
 
 def _places(body: Body) -> Iterator[Floats]:
-    """The points (n, 3) [mm] at rest, then at and between frames, moved by exact prescribed displacements: facets may tilt."""
+    """Yield the points (n, 3) [mm] of the mesh at rest, then at and between frames, moved by the exactly prescribed displacements,
+    which may tilt facets.
+    """
     yield body.mesh.points
     ends = np.unique([*body.frames, *body.stops])
     for frame in np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]):
@@ -45,7 +47,7 @@ def _places(body: Body) -> Iterator[Floats]:
 
 
 def _fixed(body: Body, facets: Ints) -> Bools:
-    """True (f, 3) for the axes along which the ``facets`` (f, 3 or 4) are prescribed exactly, by one region or by several."""
+    """Mask (f, 3) of the axes along which the ``facets`` (f, 3 or 4) are prescribed exactly, by one region or by several."""
     found = np.zeros((len(facets), 3), bool)
     for entry, others in _exact(body):
         found[np.ix_(found_in(facets, others), entry.components)] = True
@@ -53,7 +55,7 @@ def _fixed(body: Body, facets: Ints) -> Bools:
 
 
 def _normals(points: Floats, facets: Ints) -> Floats:
-    """The absolute components (f, 3) of the normals of ``facets`` (f, 3 or 4), each the maximum over triangles of the facet."""
+    """The absolute components (f, 3) of the normals of ``facets`` (f, 3 or 4), each the maximum over the triangles of a facet."""
     corners = [points[column] for column in facets.T]
     crosses = [np.abs(np.cross(b - a, c - a)) for a, b, c in combinations(corners, 3)]
     greatest = np.max(crosses, axis=0)

@@ -1,4 +1,4 @@
-"""The sum of the external loads on a muscle, from its shape alone and without the forms of a solver."""
+"""The sum of the external loads on a muscle, computed from its shape, without the forms of a solver."""
 
 from dataclasses import replace
 
@@ -12,8 +12,8 @@ from fem_reference.problems.muscle import MuscleProblem
 def external_load(
     problem: MuscleProblem, frame: float, by: Floats | None = None, velocity: Floats | None = None
 ) -> Wrench | None:
-    """The sum of the external loads at a frame, from the displacement and velocity of nodes as in ``Displaced``; None if these
-    alone do not determine the sum. Its moment is NaN without displacements.
+    """The sum of the external loads on a muscle at a ``frame``. ``by``, ``velocity``: the displacements and velocities of nodes, as
+    in ``Displaced``. The result is None if these do not determine the sum; its moment is NaN without displacements.
     """
     shape = Displaced(replace(problem.mesh, facets=problem.body.mesh.facets), by, velocity)
     known = list[Wrench]()

@@ -1,4 +1,4 @@
-"""Muscles filled with tetrahedra and fibres, with their effects, and their finite element bodies, which are attached to bones."""
+"""Problems of single muscles: set-ups filled with tetrahedra and fibres, and the finite element bodies made from them."""
 
 import time
 from dataclasses import dataclass, field, fields, replace
@@ -59,15 +59,16 @@ RELAXING = 10  # an overlap at rest is removed over this many frame numbers befo
 
 
 def kept_meshes() -> Path | None:
-    """The folder of stored tetrahedra, which may be deleted; None if they are made each time."""
+    """The folder in which tetrahedra are stored, which may be deleted; None if tetrahedra are made anew each time."""
     return platformdirs.user_cache_path("fem_reference") / "meshes"
 
 
 @dataclass(frozen=True, eq=False)
 class MuscleProblem(Setup):
-    """A set-up filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres. ``fibre``: the fibre direction
-    at any point, if an effect needs it; ``skin``: the contact surface, if there is contact; ``attached_skins``: the points of
-    springs, by attachment; ``mesh_facts``: facts on the mesh; ``seconds``: the time that meshing took.
+    """A set-up that is filled with tetrahedra and ``fibres``, with its ``effects``. ``mesh``: the tetrahedra, with the facets of
+    each attachment; ``fibre``: the fibre direction at any point, None if no effect needs it; ``skin``: the contact surface, None
+    without contact; ``attached_skins``: the points of springs, by attachment; ``mesh_facts``: facts about the mesh; ``seconds``:
+    the time that meshing took.
     """
 
     mesh: TetMesh
@@ -82,13 +83,13 @@ class MuscleProblem(Setup):
 
     @cached_property
     def directions(self) -> Floats | None:
-        """Unit vectors (k, 3) along the fibres at the middle of each tet, if an effect needs them."""
+        """The unit vectors (k, 3) along the fibres at the centroids of the tetrahedra; None if no effect needs them."""
         middles = self.mesh.points[self.mesh.tets].mean(axis=1)
         return None if self.fibre is None else self.fibre(np.arange(len(middles)), middles)
 
     @property
     def muscle(self) -> "MuscleProblem":
-        """Itself."""
+        """This problem, which has a single muscle."""
         return self
 
     @property
@@ -98,9 +99,9 @@ class MuscleProblem(Setup):
 
     @cached_property
     def body(self) -> Body:
-        """The finite element body of the muscle. Its bones prescribe the motion of exactly attached facets, or pull by
-        springs at ``attached_skins``; the rest of its surface is ``"free"``, with contact on ``skin``. InputError if two bones
-        prescribe different motions, or a motion cannot be followed.
+        """The finite element body of the muscle. Bones prescribe the motion of exactly attached facets, and pull on other
+        attachments by springs at ``attached_skins``. Facets without attachment are the region ``"free"``; contact acts on ``skin``.
+        Raises InputError if two bones prescribe different motions, or a motion cannot be followed.
         """
         mesh, first = self.mesh, self.frames[0]
         check_thinness(mesh)
@@ -123,23 +124,23 @@ class MuscleProblem(Setup):
 
     @property
     def contact(self) -> ContactEffect | None:
-        """The effect of contact, None if there is none."""
+        """The effect of contact with bones; None without contact."""
         return among(self.effects)
 
     @property
     def obstacles(self) -> tuple[Bone, ...]:
-        """The bones in contact with the muscle."""
+        """The bones with which the muscle can be in contact."""
         return tuple(bone for bone in self.bones if self.contact is not None and self.contact.is_by(bone.name))
 
     def write_meshes(self, folder: Path) -> None:
-        """Write surface, fibres and tetrahedra into ``folder``, for ParaView."""
+        """Write surface, fibres and tetrahedra for ParaView into ``folder``."""
         files.write_surface(folder / "surface.vtp", self.surface, self.surface.points)
         files.write_polylines(folder / "fibres.vtp", self.fibres, self.fibres.points)
         files.write_tets(folder / "tets.vtu", self.mesh, self.mesh.points)
 
 
 def setup(case: MuscleCase) -> Setup:
-    """Read and check the surfaces of a case and choose its attachments; InputError names the unusable part."""
+    """Read and check the surfaces of a case, and choose its attached vertices. Raises InputError that names the invalid part."""
     place = join(case.place, "muscle.surface")
     surface = files.read_surface(case.file(case.muscle.surface, "muscle.surface"), case.muscle.unit)
     surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))
@@ -150,7 +151,7 @@ def setup(case: MuscleCase) -> Setup:
 
 
 def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
-    """The full problem of a case: its set-up ``rest``, filled with tetrahedra and fibres."""
+    """The problem of a case: its set-up ``rest``, filled with tetrahedra and fibres."""
     begin, contact = time.perf_counter(), among(case.effects)
     distances_known = {} if contact is None else _distances(case, rest, contact)
     mesh = filled(case, rest, case.muscle.tet_size)
@@ -176,7 +177,9 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
 def assembled(
     rest: Setup, mesh: TetMesh, effects: tuple[Effect, ...], lines: tuple[Polylines, Directions | None], apart: float
 ) -> MuscleProblem:
-    """``rest`` filled with a ``mesh`` and fibres (``lines``); ``apart`` [mm]: the spacing of contact and spring points."""
+    """The set-up ``rest`` filled with a ``mesh``. ``lines``: the fibres, and their direction at any point, None if no effect needs
+    it; ``apart`` [mm]: the spacing of contact points and spring points.
+    """
     springs = {
         one.attachment: attached_skin(rest.surface, attached_shares(rest.surface, one.vertices), mesh, apart)
         for one in rest.attached
@@ -190,7 +193,7 @@ def assembled(
 
 
 def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[str, float | str]:
-    """Spacing and errors [mm] of bones' distance grids; InputError if bones and surface do not allow contact."""
+    """The spacing and errors [mm] of the distance grids of bones. Raises InputError if bones or attachments rule out contact."""
     for i, bone in enumerate(rest.bones):
         if contact.is_by(bone.name):
             place = join(case.place, f"bone[{i}]")
@@ -205,7 +208,9 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
 
 
 def filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
-    """Tetrahedra of a ``size`` [mm]; attachments have facets inside their rims if the mesher keeps rims, else ``facets_under``."""
+    """The surface of ``rest`` filled with tetrahedra of a ``size`` [mm]. Attachments have the facets inside their rims if the
+    mesher preserves rims, and otherwise the facets chosen by ``facets_under``.
+    """
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
     mesh = block.fill(rest.surface, size) if case.muscle.mesher == "block" else filled(rest.surface, size)
@@ -225,7 +230,7 @@ def _body(case: MuscleCase, i: int, muscle: Surface) -> Bone:
 
 
 def closed_form(bone: CaseBone, muscle: Surface, place: str) -> Bone:
-    """A ``bone`` of closed form beside a ``muscle``; its errors name ``place``."""
+    """The bone that a record ``bone`` describes by a closed form, with its surface near a ``muscle``. Errors name ``place``."""
     form, motion = solid(bone), bone.motion.poses() if bone.motion else None
     assert form is not None  # a CaseBone record has a closed form or a surface with its unit
     return Bone(bone.name, tessellated(form, muscle.points, place), motion, solid=form)
@@ -256,8 +261,9 @@ def solid(bone: CaseBone) -> Obstacle | None:
 
 
 def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:
-    """The mesher, size and quality of the mesh, and for each attachment its area on the surface and on the tets. The number of
-    attached vertices farther than ``far`` [mm] from attached facets shows islands that the tets do not resolve.
+    """Facts about the ``mesh``, by name: its mesher, size and quality. For each attachment there are its area on the surface and on
+    the tetrahedra, and the number of its vertices that are more than ``far`` [mm] from its facets, on islands that the tetrahedra
+    do not resolve.
     """
     qualities = tet_qualities(mesh.points, mesh.tets)
     facts: dict[str, float | str] = {
@@ -280,7 +286,7 @@ def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str
 
 
 def _among_bones(body: Body, bones: tuple[Bone, ...], skin: Skin, effect: ContactEffect) -> Body:
-    """The body with its bones in contact; an overlap at rest is removed before the first frame, unless the body is in situ."""
+    """A copy of ``body`` in contact with ``bones``. An overlap at rest is removed before the first frame, except under tension."""
     pressing = [bone for bone in bones if effect.is_by(bone.name)]
     first, points = body.frames[0], skin.points
     nearest = min((nearest_at_rest(bone.name, bone.shape, points) for bone in pressing), default=np.inf)

@@ -1,4 +1,4 @@
-"""Several muscles of one scene: a set-up and a problem for each, and all together as one body with contact between them."""
+"""Several muscles in one scene: a set-up and a problem for each muscle, and one body of all muscles with contact between them."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -38,7 +38,7 @@ _BETWEEN = 8  # samples of the motion of a bone between two stops
 
 @dataclass(frozen=True, eq=False)
 class MusclesSetup:
-    """The set-ups of several muscles by name, with the same bones and frames, and the ``pairs`` of muscles that may touch."""
+    """The set-ups of several ``muscles``, by name, with the same bones and frames. ``pairs``: muscles that may touch each other."""
 
     muscles: dict[str, Setup]
     pairs: tuple[tuple[str, str], ...]
@@ -55,19 +55,20 @@ class MusclesSetup:
 
     @property
     def bones(self) -> tuple[Bone, ...]:
-        """The bones of all muscles."""
+        """The bones, which all muscles share."""
         return next(iter(self.muscles.values())).bones
 
     @property
     def rest(self) -> AtRest:
-        """The surfaces alone, as one."""
+        """The rest state of all surfaces as one surface, without fibres and tetrahedra."""
         return AtRest(_surfaces(self.muscles.values()))
 
 
 @dataclass(frozen=True, eq=False)
 class MusclesProblem:
-    """The ``problems`` of several muscles by name, solved as one body, with contact of a ``law`` between the ``pairs``, if any.
-    ``apart``: True if muscles must not cross, because contact acts between them or was left out as they stay apart.
+    """The ``problems`` of several muscles, by name, which are solved as one body. ``pairs``: the muscles that may touch each other;
+    ``law``: the contact between them, None without contact; ``apart``: True if muscles must not cross, because contact acts between
+    them or was left out as they stay apart.
     """
 
     problems: dict[str, MuscleProblem]
@@ -96,17 +97,17 @@ class MusclesProblem:
 
     @property
     def seconds(self) -> float:
-        """The time of meshing."""
+        """The time [s] that the meshing of all muscles took."""
         return sum(one.seconds for one in self.problems.values())
 
     @property
     def mesh_facts(self) -> dict[str, float | str]:
-        """Facts on the meshes, by muscle."""
+        """Facts about the meshes; the name of each fact begins with the name of the muscle."""
         return {called(name, key): fact for name, one in self.problems.items() for key, fact in one.mesh_facts.items()}
 
     @cached_property
     def rest(self) -> AtRest:
-        """The rest state of everything whose positions a frame contains, muscle after muscle."""
+        """The rest state of everything whose positions a frame contains, in the order of the muscles."""
         found = list(self.problems.values())
         counts = np.concatenate([np.diff(one.fibres.offsets) for one in found])
         known = [one.directions for one in found]
@@ -124,7 +125,7 @@ class MusclesProblem:
         raise InputError("muscle", f"several ({', '.join(self.problems)})", "a case of one muscle")
 
     def write_meshes(self, folder: Path) -> None:
-        """Write surface, fibres and tetrahedra of each muscle into a folder with its name in ``folder``, for ParaView."""
+        """Write surface, fibres and tetrahedra for ParaView, in ``folder``, where each muscle has a folder with its name."""
         for name, one in self.problems.items():
             (folder / name).mkdir(exist_ok=True)
             one.write_meshes(folder / name)
@@ -150,7 +151,7 @@ class MusclesProblem:
 
     @cached_property
     def spans(self) -> tuple[Span, ...]:
-        """For each muscle, its parts of the joined arrays."""
+        """The slices of the joined arrays that belong to each muscle."""
         found = self.problems.values()
         counts = [
             (len(one.surface.points), len(one.fibres.points), len(one.mesh.points), len(one.mesh.tets)) for one in found
@@ -167,7 +168,7 @@ def _surfaces(parts: Iterable[Setup]) -> Surface:
 
 
 def setup(case: MusclesCase) -> MusclesSetup:
-    """Read and check the surfaces of all muscles, and find the pairs that may touch; InputError names the unusable part."""
+    """Read and check the surfaces of all muscles, and find the pairs that may touch. InputError names the invalid part."""
     found = dict[str, Setup]()
     for i, part in enumerate(case.parts):
         with case.placed(i):
@@ -187,8 +188,8 @@ def build(case: MusclesCase, rest: MusclesSetup) -> MusclesProblem:
 
 
 def _gaps(case: MusclesCase, muscles: Mapping[str, Setup], felt: float) -> dict[tuple[str, str], float]:
-    """A lower bound [mm] on the distance between each two muscles over all frames. It allows for bulging, the pressure of bones and
-    loads, unless the motion of the bones alone may bring two muscles within ``felt`` [mm].
+    """A lower bound [mm] on the distance between each two muscles over all frames, by the names of both. It allows for bulging, the
+    pressure of bones and loads, unless the motion of the bones alone may already bring the muscles within ``felt`` [mm].
     """
     parts, found = dict(zip(muscles, case.parts, strict=True)), dict[tuple[str, str], float]()
     beyond = cache(lambda name: _beyond(parts[name], muscles[name]))
@@ -212,14 +213,14 @@ def _beyond(case: MuscleCase, rest: Setup) -> float:
 
 def clearance(one: Setup, other: Setup) -> float:
     """A lower bound [mm] on the distance, over all frames, between two muscles that only follow the bones. It is the distance at
-    rest minus the greatest displacement of each with a bone; it is below 0 if the muscles may cross.
+    rest minus the maximum displacement of each muscle with a bone, and negative if the muscles may cross.
     """
     between = max(spacing(one.surface), spacing(other.surface))  # distances are measured between vertices
     return _apart(one.surface, other.surface) - between - _travel(one) - _travel(other)
 
 
 def _apart(one: Surface, other: Surface) -> float:
-    """The distance [mm] between two surfaces, from the vertices of each; 0 if they cross."""
+    """The distance [mm] between two surfaces, measured from the vertices of each to the other; 0 if they cross."""
     if len(crossings(one, other)):
         return 0.0
     found = [distances(a.points, b).distance.min() for a, b in ((one, other), (other, one))]
@@ -227,7 +228,7 @@ def _apart(one: Surface, other: Surface) -> float:
 
 
 def _travel(rest: Setup) -> float:
-    """The greatest displacement [mm] of a point of the muscle with any bone, sampled at frames, at keyframes, and in between."""
+    """The maximum displacement [mm] of a point of the muscle that moves with any bone, sampled as in ``_instants``."""
     points = rest.surface.points
     moved = [
         np.linalg.norm(apply(bone.pose(frame), points) - points, axis=1).max()
@@ -238,14 +239,14 @@ def _travel(rest: Setup) -> float:
 
 
 def _instants(bone: Bone, frames: Sequence[int]) -> Floats:
-    """Frame numbers at which the motion of a bone is sampled: ``frames``, its keyframes among these, and some in between."""
+    """The frame numbers at which the motion of a bone is sampled: ``frames``, keyframes within their range, and some in between."""
     assert bone.motion is not None  # called for moving bones only
     stops = sorted({*map(float, frames), *(one for one in bone.motion.frames if frames[0] <= one <= frames[-1])})
     return np.interp(np.linspace(0, len(stops) - 1, _BETWEEN * (len(stops) - 1) + 1), np.arange(len(stops)), stops)
 
 
 def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
-    """Decisions on each effect: an effect on all muscles is needed if any muscle needs it, contact if muscles come near."""
+    """The decision on each effect. An effect on all muscles is needed if any muscle needs it; contact, if two muscles come near."""
     found = [decisions(part, one) for part, one in zip(case.parts, rest.muscles.values(), strict=True)]
     every: list[Decision] = []
     for effect in case.effects:
@@ -259,7 +260,7 @@ def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
 
 
 def _touches(case: MusclesCase, rest: MusclesSetup, effect: MuscleContact) -> Decision:
-    """The decision on contact between muscles, by the least clearance between any two."""
+    """The decision on contact between muscles, from the smallest clearance between two of them."""
     known = estimates(case.parts[0], next(iter(rest.muscles.values())))
     gaps = _gaps(case, rest.muscles, effect.smoothing)
     nearest = min(gaps, key=lambda pair: gaps[pair])
@@ -270,7 +271,7 @@ def _touches(case: MusclesCase, rest: MusclesSetup, effect: MuscleContact) -> De
 
 
 def needed(case: MusclesCase, found: tuple[Decision, ...]) -> MusclesCase:
-    """The case with the needed effects, on all muscles and on each muscle."""
+    """A copy of the case with only the effects that the decisions ``found`` need, on all muscles and on single muscles."""
     kept: list[Any] = [one.effect for one in found if one.needed]
     own = tuple(
         one.model_copy(

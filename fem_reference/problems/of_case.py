@@ -1,4 +1,4 @@
-"""The set-up and the problem of a case, of a muscle or a scalar field, and their contents in words and numbers."""
+"""The set-up and the problem of any case, of muscles or of a scalar field, and their description in words and numbers."""
 
 import logging
 from collections.abc import Callable
@@ -27,19 +27,19 @@ from fem_reference.scenes.scalar import ScalarCase
 
 log = logging.getLogger(__name__)
 
-# The set-up of a case before meshing, which suffices to judge its runs; and its problem, as a solver receives it.
+# The set-up of a case before meshing, which suffices to judge runs, and the problem of a case, which a solver receives.
 CaseSetup = Setup | MusclesSetup | FieldProblem
 MechanicalProblem = MuscleProblem | MusclesProblem
 CaseProblem = MechanicalProblem | FieldProblem
 
 
 def mechanical(built: CaseProblem) -> MechanicalProblem | None:
-    """The problem ``built``, if it has one muscle or several; None for a field."""
+    """The problem ``built`` if it is a problem of muscles; None if it is a scalar field."""
     return None if isinstance(built, FieldProblem) else built
 
 
 def effects_of(built: MechanicalProblem) -> tuple[Effect, ...]:
-    """The effects of one muscle, or of all muscles and between them."""
+    """The effects that act in a problem: in its muscle, or in all of its muscles and between them."""
     if isinstance(built, MuscleProblem):
         return built.effects
     found = tuple(effect for one in built.problems.values() for effect in one.effects)
@@ -47,14 +47,17 @@ def effects_of(built: MechanicalProblem) -> tuple[Effect, ...]:
 
 
 def at_frames(built: MechanicalProblem, frames: tuple[int, ...]) -> MechanicalProblem:
-    """The problem ``built`` with other ``frames``."""
+    """A copy of the problem ``built`` with other ``frames``."""
     if isinstance(built, MuscleProblem):
         return replace(built, frames=frames)
     return replace(built, problems={name: replace(one, frames=frames) for name, one in built.problems.items()})
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
-    """Decisions on the effects that a case needs, with reasons, from the set-up by ``rest`` or a new set-up; empty for a field."""
+    """The decisions, with reasons, on the effects that a case needs; empty for a scalar field.
+
+    ``rest``: a function that returns the set-up of the case; if it is None, the set-up is made here.
+    """
     if not isinstance(case, MuscleCase | MusclesCase):
         return ()
     known = setup(case) if rest is None else rest()
@@ -66,7 +69,7 @@ def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[
 
 
 def facts(case: Case, setup: CaseSetup) -> dict[str, object]:
-    """Facts on the contents of a case by name, as words and numbers."""
+    """Facts about a case and its ``setup``, in words and numbers, by heading."""
     if isinstance(case, MuscleCase) and isinstance(setup, Setup):
         return _facts_of_muscle(setup, case)
     if isinstance(case, MusclesCase) and isinstance(setup, MusclesSetup):
@@ -118,7 +121,7 @@ def _facts_of_muscle(setup: Setup, case: MuscleCase) -> dict[str, object]:
 
 
 def _shape(bone: Bone) -> str:
-    """The number of triangles of a bone's surface, or its closed form."""
+    """The shape of a bone in words: the number of triangles of its surface, or its closed form."""
     if bone.solid is None:
         return f"{len(bone.surface.triangles)} triangles"
     kind = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(bone.solid).__name__)
@@ -131,7 +134,7 @@ def _said(value: float | tuple[float, ...]) -> str:
 
 def _motion(motion: RigidMotion | None) -> str:
     if motion is None:
-        return "rests"
+        return "fixed"
     how, unit = f"slides along {_said(motion.axis)}", "mm"
     if motion.centre is not None:
         how, unit = f"rotates about {_said(motion.axis)} through {_said(motion.centre)} mm", "rad"
@@ -140,7 +143,11 @@ def _motion(motion: RigidMotion | None) -> str:
 
 
 def known(case: Case, setup: CaseSetup) -> dict[str, object]:
-    """The effect of the bones' motion on a muscle, its regions, and the reasons for its effects, in words; empty for a field."""
+    """Facts that are known before a case is solved, in words, by heading; empty for a scalar field.
+
+    For one muscle, these are the influence of the bones' motion on its length, its regions, and the reasons for its effects. For
+    several muscles, these are the reasons for the effects.
+    """
     if isinstance(case, MusclesCase):
         every = case.decisions or explained(case, lambda: setup)
         return {"effects": {one.title: one.why for one in every}}
@@ -154,7 +161,10 @@ def known(case: Case, setup: CaseSetup) -> dict[str, object]:
 
 
 def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
-    """The case with the effects that it needs, by the decisions of ``explained`` if the case does not determine them."""
+    """A copy of the case with only the effects that it needs, as decided by ``explained``.
+
+    A case that is to use all listed effects is returned unchanged. ``rest``: as in ``explained``.
+    """
     if not isinstance(case, MuscleCase | MusclesCase) or case.choice == "listed":
         return case
     found = explained(case, rest)
@@ -167,7 +177,10 @@ def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
 
 
 def watch(case: Case, rest: CaseSetup, built: Callable[[], CaseProblem]) -> Watch | None:
-    """The watch for effects that a case omitted, from its set-up and its problem; None if the case omitted none."""
+    """The watch for effects that were omitted from the case of a single muscle; None if none were omitted, or for other cases.
+
+    ``rest``: the set-up of the case; ``built``: a function that returns its problem.
+    """
     if not isinstance(case, MuscleCase) or all(one.needed for one in case.decisions):
         return None
     assert isinstance(rest, Setup)  # of a muscle
@@ -175,7 +188,7 @@ def watch(case: Case, rest: CaseSetup, built: Callable[[], CaseProblem]) -> Watc
 
 
 def with_effects[C: Case](case: C, found: tuple[Decision, ...]) -> C:
-    """The case with the effects that the decisions ``found`` need."""
+    """A copy of the case with only the needed effects. The decisions ``found`` replace earlier decisions on the same effects."""
     for one in found:
         log.info("%s: %s", case.name, one)
     new = {id(one.effect): one for one in found}
@@ -185,21 +198,21 @@ def with_effects[C: Case](case: C, found: tuple[Decision, ...]) -> C:
 
 
 def scalar_case(case: Case) -> ScalarCase:
-    """The ``case`` itself if it has a scalar field; else InputError."""
+    """The ``case`` itself if it has a scalar field. Raises InputError otherwise."""
     if not isinstance(case, ScalarCase):
         raise InputError(case.place, f'"{case.name}", the case of a muscle', "a scalar case")
     return case
 
 
 def setup(case: Case) -> CaseSetup:
-    """The set-up of a case; InputError names the unusable part."""
+    """The set-up of a case. Raises InputError that names the invalid part."""
     if isinstance(case, MusclesCase):
         return muscles.setup(case)
     return muscle.setup(case) if isinstance(case, MuscleCase) else scalar.build(scalar_case(case))
 
 
 def problem(case: Case, rest: CaseSetup) -> CaseProblem:
-    """The problem of a case, made of its set-up ``rest``: a muscle is filled with tetrahedra."""
+    """The problem of a case, made from its set-up ``rest`` by filling each muscle with tetrahedra."""
     if isinstance(case, MusclesCase):
         assert isinstance(rest, MusclesSetup)
         return muscles.build(case, rest)

@@ -1,4 +1,6 @@
-"""Surface parts that may touch: their overlap at the start (contact search finds only a shallow one), and the skin beyond rims."""
+"""Parts of a surface that may touch: their overlap at the start, which contact search finds only if it is shallow, and the skin
+beyond their rims.
+"""
 
 from functools import lru_cache
 
@@ -11,22 +13,24 @@ from fem_reference.geometry.skins import edge_lengths
 from fem_reference.problems.body import Body, Cells, facet_corners, outer_facets, reference_nodes
 from fem_reference.problems.touching import Touching
 
-# Between contact points, half a spacing apart, a right-angled edge can penetrate by a quarter of the spacing.
+# Contact points are half a spacing apart. Between them, a right-angled edge can penetrate by this fraction of the spacing.
 BETWEEN = 0.25
 _SPLIT = np.array([[0, 1, 2], [2, 1, 3]])  # cuts a facet with four corners into two triangles
 
 
 def overlap(body: Body, law: Touching) -> float:
-    """The depth [mm] to which the parts of a ``law`` overlap at the start, as in ``overlap_at``."""
+    """The depth [mm] to which the parts of a ``law`` overlap at the start of a ``body``, measured as in ``overlap_at``."""
     points = body.mesh.points if body.start is None else body.start(np.array(body.mesh.points))
     return overlap_at(body.mesh, law, points)
 
 
 def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
-    """The depth [mm] to which the parts of a ``law`` overlap with the mesh at ``points`` (n, 3) [mm]. The greater of two depths: of
-    a corner of either part below the skin of the piece of the other part (a lower bound), and of facets that cross (too large where
-    ridges cross). For a part with itself it is the greatest depth of the middle of a facet within the entire skin, or of facets
-    that cross the skin. Curved facets are measured at their corners, minus their bulge.
+    """The depth [mm] to which the parts of a ``law`` overlap if the points of the ``mesh`` are at ``points`` (n, 3) [mm].
+
+    For two parts it is the greater of two depths: the maximum depth of the corners of each part below the skin of the other part's
+    piece of the mesh (a lower bound), and the depth of facets that cross (too large where ridges cross). For a part with itself it
+    is the greater of the maximum depth of the centre of a facet within the entire skin, and the depth of facets that cross the
+    skin. Curved facets are measured at their corners, and their bulge is subtracted.
     """
     one, other = mesh.facets[law.one], mesh.facets[law.other]
     owner, facets, triangles = _skin(mesh, points)
@@ -49,8 +53,10 @@ def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
 
 
 def through_itself(now: Surface, rest: Surface) -> tuple[float, Floats]:
-    """A lower bound on the depth [mm] of self-penetration of a surface ``now``, and its place (3,), without vertices that penetrate
-    it at ``rest``. If there are none, the depth of triangles within the body counts too, as crossing triangles show less depth.
+    """A lower bound on the depth [mm] to which a surface ``now`` penetrates itself, and the position (3,) of this penetration.
+
+    Vertices at which the surface penetrates itself at ``rest`` do not count. If there are no such vertices, the depth of triangles
+    within the body counts too, because crossing triangles show less depth.
     """
     known = _crossing(rest) if len(pairs := self_crossings(now)) else ()
     new = pairs[~np.isin(now.triangles[pairs], known).any(axis=(1, 2))]
@@ -69,7 +75,7 @@ def _crossing(surface: Surface) -> Ints:
 
 
 def longest_edge(mesh: Cells, law: Touching) -> float:
-    """The longest edge [mm] at rest of facets of a ``law``: contact points are at most a quarter of this length apart."""
+    """The longest edge [mm] at rest of the facets of a ``law``. Contact points are at most a quarter of this length apart."""
     corners = (mesh.points[mesh.facets[name]] for name in (law.one, law.other))
     return max(float(edge_lengths(one).max()) for one in corners)
 
@@ -80,7 +86,9 @@ def unseen(mesh: Cells, law: Touching) -> float:
 
 
 def beyond_rim(body: Body, side: str, other: str) -> Ints:
-    """Facets (f, 3 or 4) of the skin around ``other``, on the same piece, that ``side`` may not touch; none in self-contact."""
+    """The facets (f, 3 or 4) of the skin around the part ``other``, on the same piece of the mesh, with which no law lets the part
+    ``side`` be in contact; none for contact of a part with itself.
+    """
     mesh, facets = body.mesh, outer_facets(body.mesh)[0]
     laws = [(law.one, law.other) for law in body.touching]
     named = [mesh.facets[two] for one, two in [*laws, *(law[::-1] for law in laws)] if one == side]
@@ -90,12 +98,12 @@ def beyond_rim(body: Body, side: str, other: str) -> Ints:
 
 
 def _pieces(mesh: Cells) -> Ints:
-    """The number (n,) of the piece to which each point belongs."""
+    """The number (n,) of the connected piece of the mesh to which each point belongs."""
     return connected_parts(np.repeat(mesh.cells[:, 0], mesh.cells.shape[1]), mesh.cells.ravel(), len(mesh.points))
 
 
 def _skin(mesh: Cells, points: Floats) -> tuple[Ints, Ints, Ints]:
-    """The facets (f, 3 or 4) of one cell each, the outward triangles (t, 3) that they consist of, and the facet (t,) of each."""
+    """The facet (t,) of each triangle of the skin, the outer facets (f, 3 or 4), and the outward triangles (t, 3) of the skin."""
     facets, cells = outer_facets(mesh)
     split = _SPLIT[: facets.shape[1] - 2]
     triangles, owner = facets[:, split].reshape(-1, 3), np.repeat(np.arange(len(facets)), len(split))
@@ -107,8 +115,8 @@ def _skin(mesh: Cells, points: Floats) -> tuple[Ints, Ints, Ints]:
 
 
 def _bulge(mesh: Cells, points: Floats, parts: Ints) -> float:
-    """The greatest distance [mm] of a node from its place in a straight cell with the same corners, and of a facet with four
-    corners from its triangles, for the cells beside the facets ``parts``.
+    """The bulge [mm] of the cells at the facets ``parts``: the maximum distance of a node from its position in a straight cell with
+    the same corners, plus the maximum distance of a facet with four corners from its two triangles.
     """
     nodes, corners = reference_nodes(mesh.kind, mesh.degree), reference_nodes(mesh.kind, 1)
     at = points[mesh.cells[np.isin(mesh.cells[:, : len(corners)], parts).sum(axis=1) >= parts.shape[1]]]

@@ -25,17 +25,17 @@ class Rest:
     """A path without motion."""
 
     def __call__(self, points: Floats, frame: float) -> Floats:  # noqa: ARG002
-        """Zero, (n, 3) [mm]."""
+        """Displacements of zero, (n, 3) [mm]."""
         return np.zeros_like(points)
 
     def turning(self, points: Floats) -> Turning:  # noqa: ARG002
-        """An empty sequence of frames."""
+        """No frames and no angles, as there is no motion."""
         return (), ()
 
 
 @dataclass(frozen=True)
 class Affine:
-    """``amount (gradient X + shift)``: the displacement gradient (3, 3) and a shift [mm], times the amount at the frame."""
+    """``amount (gradient X + shift)`` at the rest position X: a displacement gradient (3, 3) and a shift [mm], times the amount."""
 
     gradient: Matrix
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -46,22 +46,22 @@ class Affine:
         return np.asarray(amount(self.knots, frame) * (points @ np.array(self.gradient).T + np.array(self.shift)))
 
     def turning(self, points: Floats) -> Turning:  # noqa: ARG002
-        """The knots, between which every point moves straight."""
+        """The frames of the knots, between which every point moves along a straight line, and an angle of 0 at each."""
         return tuple(frame for frame, _ in self.knots), (0.0,) * len(self.knots)
 
 
 def radially(
     share: float, along: tuple[float, float, float] = (1.0, 1.0, 1.0), knots: tuple[tuple[float, float], ...] = ONCE
 ) -> Affine:
-    """Displacement away from the origin by ``share`` times the distance and the amount, along the axes with an ``along`` of 1."""
+    """A displacement away from the origin by ``share`` times the amount times the distance, along axes with an ``along`` of 1."""
     x, y, z = along
     return Affine(((share * x, 0.0, 0.0), (0.0, share * y, 0.0), (0.0, 0.0, share * z)), knots=knots)
 
 
 @dataclass(frozen=True)
 class Turn:
-    """A rotation by ``angle`` [rad] times the amount at the frame, about ``axis`` through ``centre`` [mm]; with ``per_length`` the
-    angle is an angle per mm along the axis from the centre, as in a twist.
+    """A rotation by ``angle`` [rad] times the amount at the frame, about ``axis`` through ``centre`` [mm]. If ``per_length`` is
+    True, ``angle`` is the angle per mm of distance from the centre along the axis, as in a twist.
     """
 
     axis: tuple[float, float, float]
@@ -78,13 +78,13 @@ class Turn:
         return np.asarray(turned - arms)
 
     def turning(self, points: Floats) -> Turning:
-        """The knots, and at each knot the angle of the point that turns most."""
+        """The frames of the knots, and at each knot the angle [rad] of the point that rotates most."""
         _, _, along = self._arms(points)
         most = abs(self.angle) * float(np.abs(along).max(initial=0.0))
         return tuple(frame for frame, _ in self.knots), tuple(most * much for _, much in self.knots)
 
     def _arms(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """The unit vector of the axis, the arms (n, 3) from the centre, and the factor of the angle at each point (n,)."""
+        """The unit vector (3,) of the axis, the vectors (n, 3) from the centre to the points, and the factor (n,) of the angle."""
         unit = np.array(self.axis) / np.linalg.norm(self.axis)
         arms = points - np.array(self.centre)
         return unit, arms, arms @ unit if self.per_length else np.ones(len(points))
@@ -92,7 +92,7 @@ class Turn:
 
 @dataclass(frozen=True)
 class From:
-    """A ``pose`` by frame number that begins at the ``first``; earlier motion is ignored."""
+    """A ``pose`` as a function of the frame number, without its motion before the frame ``first``: it is constant until then."""
 
     first: float
     pose: Callable[[float], Floats]
@@ -102,7 +102,7 @@ class From:
         return self.pose(max(frame, self.first))
 
     def turning(self, points: Floats) -> Turning | None:
-        """Frames and angles of the pose, from the first frame on."""
+        """The frames and angles of the pose, from the frame ``first`` on."""
         known = turning(self.pose, points)
         if known is None or not known[0]:
             return known
@@ -112,7 +112,7 @@ class From:
 
 @dataclass(frozen=True)
 class Follows:
-    """The displacement of points attached to a bone with a ``pose`` by frame number."""
+    """The displacement of points attached to a bone. ``pose``: its pose as a function of the frame number."""
 
     pose: Callable[[float], Floats]
 
@@ -121,7 +121,7 @@ class Follows:
         return apply(self.pose(frame), points) - points
 
     def turning(self, points: Floats) -> Turning | None:
-        """Frames and angles of the pose."""
+        """The frames and angles of the pose."""
         return turning(self.pose, points)
 
 

@@ -1,4 +1,4 @@
-"""Problems: the parts that muscles, bodies and scalar fields have in common."""
+"""The attributes that all problems have in common, for muscles, bodies and scalar fields."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
 
-# The names of the functions of solvers for the three problems: a muscle, a scalar field, or a body of any shape.
+# The names of the solver functions for the three kinds of problem: muscles, a scalar field, or a body of any shape.
 Task = Literal["solve", "solve_field", "solve_body"]
 # The empty surface of a problem that has none.
 NO_SURFACE = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
@@ -16,8 +16,8 @@ NO_SURFACE = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
 
 @dataclass(frozen=True, eq=False)
 class AtRest:
-    """The rest shapes that the frames of a run displace, if they exist: the ``surface``, the ``fibres`` and the tetrahedra of
-    ``mesh``. ``directions`` (m, 3): the unit vector along the fibres in each tetrahedron.
+    """The shapes at rest whose positions the frames of a run contain: the ``surface``, and if they exist, the ``fibres`` and the
+    tetrahedra of ``mesh``. ``directions`` (m, 3): the unit vector along the fibres in each tetrahedron.
     """
 
     surface: Surface = NO_SURFACE

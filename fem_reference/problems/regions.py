@@ -1,4 +1,4 @@
-"""The regions of a muscle from its case, their sizes in words, and checks of the regions of any body."""
+"""The regions of a muscle as stated in its case, their sizes in words, and checks of the regions of any body."""
 
 from collections.abc import Callable
 from itertools import combinations
@@ -19,16 +19,19 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 
-_LEAST = 0.5  # The least accepted sum, at a point, of the shares of all laws of a kind.
-# The least accepted value of the greatest share in a region, which is low if the width exceeds the depth.
+_LEAST = 0.5  # the smallest accepted sum, at a point, of the shares of all laws of a kind
+# The smallest accepted maximum of the share in a region. The maximum is low if the width of the region exceeds its depth.
 _REACHED = 0.25
 _ROUNDED = 1e-6  # the rounding error of a sum of shares
-_SURE = 0.99  # a greatest share in a region is reported if it is below this
+_SURE = 0.99  # the maximum share in a region is reported if it is below this
 _SEEN = 1e-3  # an overlap is reported if its fraction of the volume is above this
 
 
 def of_case(case: MuscleCase, rest: Setup, fill: Callable[[float], TetMesh]) -> dict[str, Region]:
-    """The regions of a case by name, in its set-up ``rest``; equal names are united. ``fill`` makes tetrahedra of a size [mm]."""
+    """The regions of a case with the set-up ``rest``, by name. Regions with the same name are united.
+
+    ``fill``: a function that fills the muscle with tetrahedra of a given size [mm], for regions that need tetrahedra.
+    """
     found: dict[str, list[Region]] = {}
     for i, region in enumerate(case.region):
         found.setdefault(region.name, []).append(Blended(_depth(case, i, rest, fill), region.width))
@@ -36,7 +39,7 @@ def of_case(case: MuscleCase, rest: Setup, fill: Callable[[float], TetMesh]) -> 
 
 
 def _depth(case: MuscleCase, i: int, rest: Setup, fill: Callable[[float], TetMesh]) -> Depth:
-    """The depth in ``case.region[i]``."""
+    """The depth of points in ``case.region[i]``, as a function."""
     region, key = case.region[i], f"region[{i}]"
     if (near := region.attachment) is not None:
         shares = next(
@@ -59,7 +62,7 @@ def _depth(case: MuscleCase, i: int, rest: Setup, fill: Callable[[float], TetMes
 
 
 def facts(rest: Setup) -> dict[str, str]:
-    """The volume of each region of a muscle, and of its overlaps with others, in words."""
+    """The volume of each region of a muscle, and of the overlap of each two regions, in words."""
     points, volume = samples(rest.surface), enclosed_volume(rest.surface.points, rest.surface.triangles)
     shares = {name: region(points) for name, region in rest.regions.items()}
 
@@ -77,8 +80,8 @@ def facts(rest: Setup) -> dict[str, str]:
 
 
 def check(body: Body) -> None:
-    """Raise InputError if an effect acts in a region that does not exist or has no points, or if shares are not from 0 to 1. Raise
-    InputError also if a part of the body lacks an isochoric law, a volumetric law, or a law for the pressure unknown.
+    """Raise InputError if an effect acts in a region that does not exist or whose share is below 0.25 everywhere, if shares are not
+    from 0 to 1, or if a part of the body lacks an isochoric law, a volumetric law, or a law for the pressure unknown.
     """
     named = {i: region for i, effect in enumerate(body.effects) if (region := region_of(effect))}
     for i, region in named.items():
@@ -94,7 +97,7 @@ def check(body: Body) -> None:
         share = at.share(region)
         if not (share.min() >= 0 and share.max() <= 1):
             raise InputError(f"regions: {region}", f"shares from {share.min():g} to {share.max():g}", "from 0 to 1")
-        # A membrane has its shares at corners.
+        # The shares of a membrane are evaluated at the corners of facets.
         if isinstance(effect := body.effects[i], Load) and effect.on in body.mesh.facets:
             corners = body.points_on(effect.on)
             share = State(F=(), regions=body.shares(corners, np.zeros(len(corners), int))).share(region)
@@ -109,7 +112,9 @@ def check(body: Body) -> None:
 
 
 def _check_whole(kind: str, laws: list[Energy], at: State, points: Floats) -> None:
-    """Raise InputError if ``laws`` of a ``kind``, if any, do not cover ``points`` (n, 3); those of pressure must sum to 1."""
+    """Raise InputError unless the shares of all ``laws`` of a ``kind`` sum to at least 0.5 at each of ``points`` (n, 3), and to 1
+    for laws with a pressure unknown. ``at``: the state with the shares at these points. Without laws nothing is checked.
+    """
     total = np.zeros(len(points)) + sum(at.share(law.region) for law in laws)
     off = np.abs(total - 1) - _ROUNDED if kind == "pressure" else _LEAST - total
     if laws and not off.max() <= 0:

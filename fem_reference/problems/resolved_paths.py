@@ -1,12 +1,13 @@
-"""Frame numbers at which load steps end, so that no step skips motion between the requested frames.
+"""Frame numbers (stops) at which load steps end, so that no step skips motion between the requested frames.
 
-Between two stops no bone and no prescribed region turns by more than a right angle: from half a turn on, the straight line between
-two poses loses the sense of rotation. Apart from the motion common to all, none moves farther than the size of the body. No point
-moves out and back: no path exceeds 1.12 times the distance between its ends by more than a hundredth of the body's size.
+Between two stops no bone and no prescribed region rotates by more than a right angle, because a straight line between two poses
+that are half a turn or more apart loses the sense of rotation. Apart from the motion that all have in common, none moves farther
+than the size of the body. No point moves out and back: the length of its path exceeds 1.12 times the distance between the ends of
+the path by at most a hundredth of the body's size.
 
-Motions and paths of this package state the frames at which they bend and the angles by which they turn in between (``turning``), so
-this holds for all of them. Any other function of a frame number is sampled 1024 times over all frames, at least 16 times between
-two frames, and more often where it moves far. Faster motion is not detected.
+Motions and paths of this package state the frames at which they change direction and the angles by which they rotate in between
+(``turning``), so that these rules hold for all of them. Any other function of a frame number is sampled 1024 times over all frames,
+at least 16 times between two frames, and more often where it moves far. Faster motion is not detected.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,20 +23,23 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.motion import Turning, apply
 
-# The greatest rotation [rad] in a load step and between samples, and the greatest travel between samples in sizes of the body.
+# The maximum rotation [rad] in a load step, the maximum rotation [rad] between samples, and the maximum travel between samples as a
+# fraction of the size of the body.
 TURN, _SAMPLED, _STRIDE = np.pi / 2, np.pi / 16, 0.5
-# A quarter of a circle is 1.11 times as long as its chord. A path counts as returning if it is longer than ``_BENT`` chords and
-# exceeds the chord by ``_BACK`` times the body's size.
+# A quarter of a circle is 1.11 times as long as its chord. A path counts as returning if it is longer than ``_BENT`` times its
+# chord plus ``_BACK`` times the size of the body.
 _BENT, _BACK = 1.12, 0.01
 _SAMPLES, _BETWEEN = 1024, 16  # the number of samples of an unknown motion, over all frames and between two
 _POINTS = 32  # the number of sampled points of a region
-_MOST = 20_000  # the largest number of sampled frames
-_SHORTEST = 1e-9  # the fraction of all frames within which a long motion counts as a jump
+_MOST = 20_000  # the maximum number of sampled frames
+_SHORTEST = 1e-9  # a long motion counts as a jump if it takes less than this fraction of the range of frames
 
 
 @dataclass(frozen=True)
 class Moving:
-    """Points (p, 3) [mm] ``at`` a frame, their ``turning`` if known, the ``place`` for messages; ``scale``: True for an amount."""
+    """Something that moves. ``place``: its name in messages; ``at``: a function from a frame number to the positions (p, 3) [mm] of
+    its points; ``turning``: the frames and angles of its rotation, None if unknown; ``scale``: True for the amount of an effect.
+    """
 
     place: str
     at: Callable[[float], Floats]
@@ -44,8 +48,8 @@ class Moving:
 
 
 def turning(path: object, points: Floats) -> Turning | None:
-    """The frames between which a ``path`` of ``points`` (p, 3) is steady (straight or about an axis), and the angle [rad] turned at
-    each of them; None if the path does not state them.
+    """The frames between which a ``path`` of ``points`` (p, 3) is steady (a straight motion, or a rotation about an axis), and the
+    angle of rotation [rad] at each of these frames; None if the path does not state them.
     """
     owner = getattr(path, "__self__", path)  # the object of a method
     if not type(owner).__module__.startswith("fem_reference."):
@@ -56,7 +60,7 @@ def turning(path: object, points: Floats) -> Turning | None:
 
 
 def moving_ramp(effect: Effect, size: float) -> Moving | None:
-    """The amount of an ``effect`` as the motion of a point, by ``size`` [mm] for the full amount; None if it is constant."""
+    """The amount of an ``effect`` as the motion of a point, by ``size`` [mm] for the maximum amount; None for a constant amount."""
     if type(effect).amount is Effect.amount:
         return None
     knots = effect.ramp if isinstance(effect, Ramped) and type(effect).amount is Ramped.amount else None
@@ -73,8 +77,8 @@ def some(points: Floats) -> Floats:
 
 
 def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tuple[float, ...]:
-    """Frame numbers between the first and the last of ``frames`` at which a load step ends, for a body of a ``size`` [mm];
-    InputError if anything jumps, is not finite, or moves without end.
+    """The frame numbers between the first and the last of ``frames`` at which a load step must end. ``things``: everything that
+    moves; ``size`` [mm]: the size of the body. Raises InputError if a motion jumps, is not finite, or is too long to be sampled.
     """
     if len(frames) < 2 or not things:
         return ()
@@ -89,7 +93,7 @@ def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tup
 
 
 def skipped(things: Sequence[Moving], frames: Sequence[float], size: float) -> tuple[Moving, float, float] | None:
-    """The first of ``things`` that moves too far from one of ``frames`` to the next, and these two frames; None without any."""
+    """The first of ``things`` that moves too far from one of ``frames`` to the next, and these two frames; None if none does."""
     looked = _Samples(things, np.unique(np.concatenate([frames, *(_grid(thing, frames) for thing in things)])), size)
     for early, late in pairwise(np.searchsorted(looked.frames, frames).tolist()):
         for i, thing in enumerate(things):
@@ -99,13 +103,13 @@ def skipped(things: Sequence[Moving], frames: Sequence[float], size: float) -> t
 
 
 def posed(place: str, pose: Callable[[float], Floats], points: Floats) -> Moving:
-    """The motion of the corners of the box around ``points`` (n, 3) [mm], with a rigid ``pose``."""
+    """The motion of the corners of the box around ``points`` (n, 3) [mm] with a rigid ``pose``. ``place``: its name in messages."""
     box = np.where(np.indices((2, 2, 2)).reshape(3, -1).T, points.max(axis=0), points.min(axis=0))
     return Moving(place, lambda frame: apply(pose(frame), box), turning(pose, box))
 
 
 def _grid(thing: Moving, frames: Sequence[float]) -> Floats:
-    """The frames at which a thing is sampled first."""
+    """The frames at which a ``thing`` is sampled initially."""
     first, last = frames[0], frames[-1]
     if thing.turning is None:
         count = max(_BETWEEN, -(-_SAMPLES // (len(frames) - 1)))
@@ -114,14 +118,16 @@ def _grid(thing: Moving, frames: Sequence[float]) -> Floats:
     ends = np.unique(np.clip([first, *knots, last], first, last))
     turned = np.abs(np.diff(np.interp(ends, knots, angles))) if len(knots) else np.zeros(len(ends) - 1)
     if not turned.sum() < _MOST * _SAMPLED:
-        got, want = f"{turned.sum():.4g} rad of turning", f"at most {_MOST * _SAMPLED:.0f} rad"
+        got, want = f"{turned.sum():.4g} rad of rotation", f"at most {_MOST * _SAMPLED:.0f} rad"
         raise InputError(f"{thing.place}: path", got, want)
     counts = np.maximum(np.ceil(turned / _SAMPLED - 1e-9), 1).astype(int)
     return np.concatenate([np.linspace(a, b, count + 1) for (a, b), count in zip(pairwise(ends), counts, strict=True)])
 
 
 class _Samples:
-    """Samples at ``frames`` (m,): positions (m, p, 3), rotations (m,) [rad], path lengths (m, p) [mm] without the common motion."""
+    """Samples of ``things`` at ``frames`` (m,). For each thing there are positions (m, p, 3) [mm], and cumulative rotations (m,)
+    [rad] and path lengths (m, p) [mm], the latter with and without the motion that all have in common.
+    """
 
     def __init__(self, things: Sequence[Moving], frames: Floats, size: float) -> None:
         self.things, self.frames, self.size = things, frames, size
@@ -139,7 +145,7 @@ class _Samples:
             )
 
     def wide(self) -> Floats:
-        """The middles of intervals in which anything moves too far to be resolved; InputError if it jumps."""
+        """The midpoints of the intervals in which a thing moves too far to be resolved. Raises InputError if a thing jumps."""
         spans, found = np.diff(self.frames), np.zeros(len(self.frames) - 1, bool)
         short = ~(spans > _SHORTEST * (self.frames[-1] - self.frames[0]))
         for apart, angles in zip(self.apart, self.angles, strict=True):
@@ -152,18 +158,20 @@ class _Samples:
         return (self.frames[:-1] + spans / 2)[found]
 
     def _jump(self, i: int) -> InputError:
-        """The error for the thing that moves farthest in the interval ``i``."""
+        """The InputError for the thing that moves farthest in the interval ``i``."""
         far = [float(strides[i].max()) for strides in self.strides]
         which = int(np.argmax(far))
-        got = f"{far[which]:.4g} mm up to frame {self.frames[i + 1]:g}, or a turn by {self.angles[which][i]:.3g} rad"
+        got = (
+            f"{far[which]:.4g} mm up to frame {self.frames[i + 1]:g}, or a rotation by {self.angles[which][i]:.3g} rad"
+        )
         return InputError(f"{self.things[which].place}: path at frame {self.frames[i]:g}", got, "a path without jumps")
 
     def farthest(self, at: int) -> int:
-        """The number of the last frame up to which one load step may go from the frame of number ``at``."""
+        """The index of the last sampled frame that one load step may reach from the sampled frame with the index ``at``."""
         return max(at + 1, min(self.reach(i, at) for i in range(len(self.things))))
 
     def reach(self, i: int, at: int) -> int:
-        """The same as ``farthest``, for the thing of number ``i``."""
+        """The same as ``farthest``, but only for the thing with the index ``i``."""
         turns, places = self.turns[i], self.places[i] - self.places[i][at]
         travels, lengths = ((each[i] - each[i][at]) for each in (self.travels, self.lengths))
         last = int(np.searchsorted(turns, turns[at] + TURN + 1e-6, "right")) - 1
@@ -174,7 +182,7 @@ class _Samples:
 
 
 def _places(thing: Moving, frames: Floats) -> Floats:
-    """The points of a thing at ``frames``, (m, p, 3) [mm]; InputError if they are not finite."""
+    """The positions (m, p, 3) [mm] of the points of a ``thing`` at ``frames`` (m,). Raises InputError if they are not finite."""
     found = np.array([thing.at(float(frame)) for frame in frames], float)
     lost = np.flatnonzero(~np.isfinite(found).all(axis=(1, 2)))
     if len(lost):
@@ -184,12 +192,14 @@ def _places(thing: Moving, frames: Floats) -> Floats:
 
 
 def _steps(places: Floats) -> Floats:
-    """The distances (m - 1, p) that points (m, p, 3) go from each frame to the next."""
+    """The distances (m - 1, p) that points move from each frame to the next. ``places`` (m, p, 3): their positions."""
     return np.asarray(np.linalg.norm(np.diff(places, axis=0), axis=2))
 
 
 def _turns(thing: Moving, frames: Floats, places: Floats) -> Floats:
-    """The angles (m - 1,) [rad] between ``frames`` (m,): known, or the greatest turn of a direction from the middle."""
+    """The rotations (m - 1,) [rad] of a ``thing`` between successive ``frames`` (m,): as the thing states them, or else the maximum
+    rotation of the direction from the centroid to a point. ``places`` (m, p, 3): the positions of the points.
+    """
     if thing.turning is not None:
         knots, angles = thing.turning
         return np.abs(np.diff(np.interp(frames, knots, angles))) if knots else np.zeros(len(frames) - 1)

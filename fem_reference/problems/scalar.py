@@ -1,4 +1,4 @@
-"""Scalar cases as arrays for solvers: mesh, effects, boundary conditions; independent of any solver."""
+"""Scalar cases as arrays for solvers: mesh, effects and boundary conditions. This module is independent of any solver."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +24,7 @@ from fem_reference.scenes.scalar import Boundary, MeshFiles, ScalarCase
 
 @dataclass(frozen=True, eq=False)
 class Flux:
-    """``facets`` (f, 1 or 2), by their vertices, and the formula of the field's ``slope`` along their outward normal."""
+    """A Neumann condition: the vertices of ``facets`` (f, 1 or 2), and the formula of the ``slope`` along their outward normal."""
 
     facets: Ints
     slope: str
@@ -32,9 +32,10 @@ class Flux:
 
 @dataclass(frozen=True, eq=False)
 class FieldProblem:
-    """A scalar field to be solved: ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node (the vertices, then
-    for order 2 the midpoints of ``mesh.edges``), NaN if it is free; ``upper`` (m,) the fraction of each cell above the mean y;
-    ``tau`` (m,) of the stabilised form, None for the plain form; ``peclet`` the mesh Peclet number; ``exact`` the known solution.
+    """A scalar field to be solved. ``order``: the order of the Lagrange elements. ``fixed`` (N,): the prescribed value at each node
+    (the vertices, then for order 2 the midpoints of ``mesh.edges``), NaN if the node is free. ``fluxes``: the Neumann conditions.
+    ``upper`` (m,): the fraction of each cell above the mean y. ``tau`` (m,): the parameter of the stabilised form, None for the
+    plain form. ``peclet``: the mesh Peclet number. ``exact``: the exact solution, if it is known.
     """
 
     mesh: FieldMesh
@@ -59,7 +60,7 @@ class FieldProblem:
 
     @property
     def field(self) -> "FieldProblem":
-        """Itself."""
+        """This problem, which is a scalar field."""
         return self
 
     def write_meshes(self, folder: Path) -> None:
@@ -74,7 +75,7 @@ class FieldProblem:
 
     @property
     def mesh_facts(self) -> dict[str, float]:
-        """Size and quality of the mesh."""
+        """The size of the mesh and its Peclet number."""
         return {"cells": float(len(self.mesh.cells)), "nodes": float(len(self.fixed)), "mesh_peclet": self.peclet}
 
     @property
@@ -89,7 +90,7 @@ class FieldProblem:
 
 
 def build(case: ScalarCase, refinements: int = 0) -> FieldProblem:
-    """The problem of a case with ``refinements`` of its mesh; InputError names the unusable part."""
+    """The problem of a case whose mesh is refined ``refinements`` times. Raises InputError that names the invalid part."""
     mesh = check(mesh_of(case))
     dimension = mesh.points.shape[1]
     _check_effects(case, mesh)
@@ -158,7 +159,7 @@ def at(formula: str, points: Floats) -> Floats:
 
 
 def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
-    """The values (n,) at vertices that files of bounds prescribe, NaN without a value."""
+    """The values (n,) that files of ``bounds`` prescribe at vertices; NaN at a vertex without a value."""
     values = np.full(len(mesh.points), np.nan)
     for i, entry in enumerate(case.boundary):
         if entry.bounds is not None:
@@ -179,7 +180,7 @@ def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
 
 
 def _between(mesh: FieldMesh, values: Floats) -> Floats:
-    """The values (e,) at the midpoints of edges: on the rim the mean of the values of both ends if both have a value, else NaN."""
+    """The values (e,) at the midpoints of edges: on the rim the mean of the ``values`` at both ends; NaN inside or without both."""
     edges = mesh.edges
     middles = np.full(len(edges), np.nan)
     if mesh.cells.shape[1] == 3:
@@ -189,7 +190,7 @@ def _between(mesh: FieldMesh, values: Floats) -> Floats:
 
 
 def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
-    """The value at each node, NaN if it is free; InputError if two conditions disagree on a node."""
+    """The prescribed value (N,) at each node, NaN if it is free. Raises InputError if two conditions disagree on a node."""
     fixed = np.array(given) if case.element.order == 1 else np.concatenate([given, _between(mesh, given)])
     nodes, sloped = mesh.nodes[case.element.order], np.empty(0, np.int64)
     for i, entry in enumerate(case.boundary):
@@ -231,7 +232,7 @@ def _facets(entry: Boundary, mesh: FieldMesh) -> Ints:
 
 
 def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
-    """The nodes on facets: their vertices, and for order 2 the midpoints of facets that are edges."""
+    """The nodes on ``facets``: their vertices, and for order 2 the midpoints of facets that are edges."""
     vertices = np.unique(facets)
     if order == 1 or facets.shape[1] == 1:
         return vertices
@@ -239,7 +240,7 @@ def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
 
 
 def mesh_of(case: ScalarCase) -> FieldMesh:
-    """The mesh of a scalar case; InputError names the unusable part."""
+    """The mesh of a scalar case. Raises InputError that names the invalid part."""
     domain = case.domain
     if domain.mesh is not None:
         return _mesh_files(case, domain.mesh)
@@ -292,7 +293,7 @@ def numbers(path: Path) -> Floats:
 
 
 def whole_numbers(path: Path, values: Floats) -> Ints:
-    """``values`` of a file as numbers of vertices; InputError if they are not integers."""
+    """The ``values`` of a file as vertex numbers. Raises InputError if they are not integers."""
     wrong = (values != np.round(values)) | (np.abs(values) > np.iinfo(np.int32).max)
     if wrong.any():
         raise InputError(str(path), f"the vertex {values[wrong][0]:g}", "vertices, numbered from 1")

@@ -1,4 +1,4 @@
-"""Muscles before they are meshed: the surface, its bones, its attachments, its joints, and the requested frames."""
+"""The set-up of a muscle before meshing: its surface, bones, attachments and joints, and the requested frames."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,19 +25,20 @@ from fem_reference.scenes.muscle import MuscleCase, Vector
 
 # Distances to a bone are computed up to this distance [mm] from it.
 DISTANCE_MARGIN = 12.0
-# The greatest angle [rad] and distance [mm] between the axis of a joint and the axis of its bone's rotation.
+# Tolerances: the maximum allowed angle [rad] and distance [mm] between the axis of a joint and the rotation axis of its bone.
 _SAME_DIRECTION, _SAME_LINE = 1e-6, 1e-3
 
 
 def kept_distances() -> Path:
-    """The folder of stored distance grids, which may be deleted."""
+    """The folder in which distance grids are stored. It may be deleted."""
     return platformdirs.user_cache_path("fem_reference") / "distances"
 
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A rigid bone with its ``surface`` at rest and its ``motion``, None if it is fixed. The allowed error and Gaussian rounding
-    of its distance [mm] are those of ``CaseBone``. The vertices of the surface lie on the closed form ``solid``, if there is one.
+    """A rigid bone. ``surface``: its surface at rest; ``motion``: None if the bone is fixed; ``distance_error`` and
+    ``distance_rounding`` [mm]: as in ``CaseBone``; ``solid``: the closed form on which the vertices of the surface lie, None for a
+    surface from a file.
     """
 
     name: str
@@ -49,25 +50,25 @@ class Bone:
 
     @cached_property
     def shape(self) -> Obstacle:
-        """The signed distance to the surface, in the bone's rest pose; InputError if the surface of a file is not closed."""
+        """The signed distance to the bone in its rest pose. Raises InputError if a surface from a file is not closed."""
         named = replace(self.surface, place=f'bone "{self.name}": {self.surface.place}')
         error, rounding = self.distance_error, self.distance_rounding
         return self.solid or cached(named, error, DISTANCE_MARGIN, rounding, kept_distances())
 
     def pose(self, frame: float) -> Floats:
-        """The matrix (4, 4) that takes rest positions to positions at ``frame``."""
+        """The matrix (4, 4) that maps rest positions to positions at ``frame``."""
         return np.eye(4) if self.motion is None else self.motion.pose(frame)
 
     def distances(self, frame: float, points: Floats) -> Floats:
-        """Distance (n,) [mm] of ``points`` (n, 3) to the bone at ``frame``, negative inside."""
+        """Signed distances (n,) [mm] of ``points`` (n, 3) to the bone at ``frame``, negative inside."""
         return self.shape.distances(apply(np.linalg.inv(self.pose(frame)), points))
 
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint in which a ``bone`` turns about the unit vector ``axis`` (3,) through ``centre`` (3,) [mm], right-handed.
+    """A joint in which a ``bone`` rotates, right-handed, about the unit vector ``axis`` (3,) through ``centre`` (3,) [mm].
 
-    ``angle_of``: the angle of the joint [rad] at a frame number, 0 at rest.
+    ``angle_of``: a function of the frame number that returns the angle of the joint [rad], which is 0 at rest.
     """
 
     name: str
@@ -83,8 +84,9 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class AttachedVertices:
-    """The ``vertices`` (k,) of the surface attached to ``bone``, exactly or by springs of ``stiffness`` [MPa/mm]; ``tendon`` (3,)
-    [mm]: the point of the bone at rest to which fibres with ends beside these vertices continue, if any.
+    """The ``vertices`` (k,) of the surface that belong to an ``attachment`` to a ``bone``. ``stiffness`` [MPa/mm]: the stiffness of
+    springs, None if the attachment is exact. ``tendon`` (3,) [mm]: the point on the bone at rest to which fibres that end near
+    these vertices continue, None without a tendon.
     """
 
     attachment: str
@@ -96,10 +98,10 @@ class AttachedVertices:
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """The set-up of a muscle, as needed by a surface solver: its ``surface`` at rest, the bones, the attached vertices, and the
-    requested frames. ``interval`` [s]: the time between successive frame numbers, if the case states it. ``start``: a function from
-    rest positions (n, 3) to positions in the first frame, if they differ. ``joints``: the axes of bones that turn. ``regions``:
-    parts in which effects act, by name.
+    """The set-up of a muscle, which suffices for a surface solver: its ``surface`` at rest, the ``bones``, the ``attached``
+    vertices and the requested ``frames``. ``interval`` [s]: the time between consecutive frame numbers, None if the case does not
+    state it. ``start``: a function from rest positions (n, 3) to positions at the first frame, None if they are equal. ``joints``:
+    the joints in which bones rotate. ``regions``: the regions in which effects act, by name.
     """
 
     surface: Surface
@@ -117,21 +119,21 @@ class Setup:
 
     @property
     def rest(self) -> AtRest:
-        """The surface alone."""
+        """The rest state of the surface, without fibres and tetrahedra."""
         return AtRest(self.surface)
 
     @property
     def body(self) -> Body | None:
-        """The finite element body, which exists once the set-up is filled with elements."""
+        """The finite element body; None, because a set-up is not filled with elements."""
         return None
 
     def begin(self, rest: Floats) -> Floats:
-        """Positions (n, 3) at the first frame of points that are at ``rest`` (n, 3) [mm]; a new array."""
+        """The positions (n, 3) [mm] at the first frame of points whose rest positions are ``rest`` (n, 3); a new array."""
         return np.array(rest) if self.start is None else np.array(self.start(rest))
 
     @cached_property
     def attached_vertices(self) -> Ints:
-        """The vertices (k,) of the surface that are attached to bones, attachment by attachment."""
+        """The vertices (k,) of the surface that are attached to bones, in the order of the attachments."""
         return np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in self.attached)])
 
     @cached_property
@@ -147,9 +149,9 @@ class Setup:
 
 
 def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
-    """The joints of a case; without any, a joint for each bone that rotates, with the bone's name and the axis of its motion.
+    """The joints of a case. If the case states none, each rotating bone has a joint with the bone's name and axis of rotation.
 
-    InputError if a bone does not rotate about the axis of its joint, as the joint would have no angle.
+    Raises InputError if a bone does not rotate about the axis of its joint, because the joint would have no angle.
     """
     if not case.joint:
         moving = ((bone, bone.motion) for bone in bones if bone.motion is not None)
@@ -161,7 +163,7 @@ def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
     for i, joint in enumerate(case.joint):
         bone, place = by_name[joint.bone], join(case.place, f"joint[{i}]")
         if bone.motion is None or bone.motion.centre is None:
-            got = f'the bone "{bone.name}", which {"rests" if bone.motion is None else "slides"}'
+            got = f'the bone "{bone.name}", which {"is fixed" if bone.motion is None else "slides"}'
             raise InputError(join(place, "bone"), got, "a bone that rotates, so that the joint has an angle")
         _check_axis(bone.motion, np.array(joint.axis), np.array(joint.centre), place)
         found.append(_joint(joint.name, bone, bone.motion, joint.axis, joint.centre))
@@ -169,7 +171,7 @@ def joints_of(case: MuscleCase, bones: tuple[Bone, ...]) -> tuple[Joint, ...]:
 
 
 def _joint(name: str, bone: Bone, motion: RigidMotion, axis: Vector, centre: Vector) -> Joint:
-    """The joint of a bone; an ``axis`` opposite to the axis of its ``motion`` reverses the sign of the angle."""
+    """The joint of a ``bone``. If ``axis`` is opposite to the axis of the bone's ``motion``, the sign of the angle is reversed."""
     unit, sign = np.array(axis) / np.linalg.norm(axis), float(np.sign(np.dot(axis, motion.axis)))
     return Joint(name, bone, unit, np.array(centre), partial(_angle, motion, sign))
 
@@ -184,4 +186,6 @@ def _check_axis(motion: RigidMotion, axis: Floats, centre: Floats, place: str) -
         want = f"the axis of the bone's motion, {motion.axis}, or its opposite"
         raise InputError(join(place, "axis"), str(tuple(axis.tolist())), want)
     if (off := float(np.linalg.norm(away - (away @ turns) * turns))) > _SAME_LINE:
-        raise InputError(join(place, "centre"), f"a point {off:.3g} mm off the axis of the bone's motion", "one on it")
+        raise InputError(
+            join(place, "centre"), f"a point {off:.3g} mm off the axis of the bone's motion", "a point on it"
+        )

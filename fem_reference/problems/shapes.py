@@ -1,4 +1,4 @@
-"""Structured bodies of the catalogue: smooth maps of unit cubes, cut into cells, straight or curved.
+"""Structured bodies of the catalogue: smooth maps of unit cubes that are cut into straight or curved cells.
 
 All lengths are in mm. A region lists the corners of its facets in lattice order: in a quadrilateral, corners 0 and 3 are opposite.
 """
@@ -19,25 +19,25 @@ from fem_reference.problems.checks import check_box
 Map = Callable[[Floats], Floats]
 Counts = tuple[int, int, int]
 
-# Nodes closer to each other than this fraction of the body's size are one node.
+# Nodes closer to each other than this fraction of the body's size are merged.
 _SAME = 1e-9
-# The bulge of the sides of the square in a disc for which three blocks meet at its corners at 120 degrees each.
+# The bulge of the sides of the square in a disc, chosen so that three blocks meet at each of its corners at 120 degrees each.
 _BULGE = np.tan(np.pi / 12) / 2
-# Half the square's side over the radius of its disc.
+# Half the side of the square, divided by the radius of its disc.
 _SQUARE_IN_CYLINDER = 0.45
 _SQUARE_IN_VENTRICLE = 0.22
 # The ventricle of Land et al. 2015 (doi 10.1098/rspa.2015.0641): semi-axes inside, wall thickness, and z of its base [mm].
 _SHORT, _LONG, _WALL, _BASE = 7.0, 17.0, 3.0, 5.0
-# At the apex, the slope of the angle exceeds its mean by this fraction, so that arc length grows evenly.
+# At the apex, the slope of the angle exceeds its mean by this fraction, so that the arc length grows evenly.
 _APEX = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Brick:
-    """A part of a body: ``place`` maps points (n, 3) of the unit cube smoothly to points (n, 3) [mm]. ``counts`` are the numbers of
-    cells along its axes. ``faces`` maps a face of the cube, x0 to z1, to its region of the surface.
+    """A block of a body. ``place``: a smooth function from points (n, 3) of the unit cube to points (n, 3) [mm]; ``counts``: the
+    numbers of cells along the axes of the cube; ``faces``: the region of the surface on each face of the cube, by face, x0 to z1.
 
-    Where two blocks meet, the axes along their common face have the same directions, so that the tetrahedra match.
+    If two blocks meet, the axes along their common face must have the same directions, so that the tetrahedra match.
     """
 
     place: Map
@@ -46,7 +46,7 @@ class Brick:
 
 
 def mapped(blocks: Sequence[Brick], kind: Kind, degree: int) -> Cells:
-    """The body that ``blocks`` make up: nodes at the same position are merged, and every cell has a positive Jacobian."""
+    """The mesh of a body that consists of ``blocks``. Nodes at the same position are merged; all cells have a positive Jacobian."""
     grids = [tuple(degree * count + 1 for count in block.counts) for block in blocks]
     units = [np.indices(grid).reshape(3, -1).T / np.subtract(grid, 1) for grid in grids]
     points, name = _merged(np.concatenate([block.place(unit) for block, unit in zip(blocks, units, strict=True)]))
@@ -63,7 +63,7 @@ def mapped(blocks: Sequence[Brick], kind: Kind, degree: int) -> Cells:
 
 
 def _lattice(counts: Counts, kind: Kind, degree: int) -> Ints:
-    """Lattice indices (m, k, 3) of the nodes of each cell; tetrahedra are the six Kuhn tetrahedra of each cube."""
+    """The lattice indices (m, k, 3) of the nodes of each cell. Tetrahedra are the six Kuhn tetrahedra of each cube."""
     nodes = reference_nodes(kind, degree)
     if kind == "hexahedron":
         patterns = [nodes]
@@ -76,7 +76,7 @@ def _lattice(counts: Counts, kind: Kind, degree: int) -> Ints:
 
 
 def _merged(points: Floats) -> tuple[Floats, Ints]:
-    """The distinct points (n, 3) among ``points``, and for each of ``points`` its number among them."""
+    """The distinct points (n, 3) among ``points``, and the index of each of ``points`` among the distinct points."""
     tolerance = _SAME * float(np.ptp(points, axis=0).max())
     first, second = cKDTree(points).query_pairs(tolerance, output_type="ndarray").T
     name = connected_parts(first, second, len(points))
@@ -84,7 +84,7 @@ def _merged(points: Floats) -> tuple[Floats, Ints]:
 
 
 def _facets(cells: Ints, lattice: Ints, grid: tuple[int, ...], face: str, kind: Kind) -> Ints:
-    """The corners (f, 3 or 4) of the facets of ``cells`` that lie on a face of the ``lattice`` of ``grid`` nodes."""
+    """The corners (f, 3 or 4) of the facets of ``cells`` that lie on a ``face`` of the ``lattice``, which has ``grid`` nodes."""
     axis = "xyz".index(face[0])
     there = lattice[..., axis] == int(face[1]) * (grid[axis] - 1)
     sides = [list(corners) for corners in facet_corners(kind)]
@@ -92,7 +92,7 @@ def _facets(cells: Ints, lattice: Ints, grid: tuple[int, ...], face: str, kind: 
 
 
 def _upright(points: Floats, cells: Ints, kind: Kind, degree: int) -> Ints:
-    """The ``cells``, mirrored if their volume is negative: the first two axes of their reference cell are exchanged."""
+    """The ``cells``, of which those with negative volume are mirrored: the first two axes of their reference cell are exchanged."""
     corners = points[cells[:, [0, 1, 2, 3 if kind == "tetrahedron" else 4]]]
     wrong = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
     nodes = reference_nodes(kind, degree)
@@ -104,17 +104,17 @@ _SIX = {face: face for face in ("x0", "x1", "y0", "y1", "z0", "z1")}
 
 
 def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: int = 1) -> Cells:
-    """A box from the origin, with its faces x0, x1, y0, y1, z0, z1 and edges of lengths ``size`` [mm] along x, y, z.
+    """A box with a corner at the origin, faces x0, x1, y0, y1, z0, z1, and edges of lengths ``size`` [mm] along x, y, z.
 
-    ``counts``: the cells along x, y, z; a tetrahedral box has six tetrahedra in each. ``kind``: ``"tetrahedron"`` or
-    ``"hexahedron"``. ``degree`` 1: straight cells; 2: cells with nodes on their edges too.
+    ``counts``: the numbers of cells along x, y, z; with tetrahedra, each of these cells is cut into six. ``kind``:
+    ``"tetrahedron"`` or ``"hexahedron"``. ``degree``: 1 for straight cells, 2 for cells with nodes on their edges too.
     """
     check_box(counts, size, kind, degree)
     return mapped([Brick(lambda unit: unit * size, counts, _SIX)], kind, degree)
 
 
 def joined(pieces: Mapping[str, Cells]) -> Cells:
-    """The mesh of separate ``pieces`` of one kind and degree; the name of a region follows the name of its piece: ``left_x1``."""
+    """The mesh of separate ``pieces`` of one kind and degree. Names of regions begin with the name of the piece: ``left_x1``."""
     meshes, kinds = pieces.values(), {(piece.kind, piece.degree) for piece in pieces.values()}
     if len(kinds) != 1:
         raise InputError("pieces", f"{len(kinds)} kinds and degrees of cells", "one")
@@ -129,9 +129,9 @@ def joined(pieces: Mapping[str, Cells]) -> Cells:
 def warped_box(
     counts: Counts, size: tuple[float, float, float], kind: Kind, degree: int = 1, bump: float = 0.1
 ) -> Cells:
-    """A :func:`box` whose inner nodes are moved, by up to ``bump`` of its size: its faces do not move.
+    """A :func:`box` whose inner nodes are moved by up to ``bump`` times its size. Its faces do not move.
 
-    From 0.15 on cells may be inverted: first curved tetrahedra, where there is only one cell along an axis.
+    If ``bump`` is 0.15 or more, cells may be inverted; curved tetrahedra are the first if there is only one cell along an axis.
     """
 
     def place(unit: Floats) -> Floats:
@@ -142,9 +142,10 @@ def warped_box(
 
 
 def tube_quarter(inner: float, outer: float, length: float, counts: Counts, kind: Kind, degree: int) -> Cells:
-    """The quarter x, y >= 0 of a tube along z, of radii ``inner`` and ``outer`` and a ``length`` [mm].
+    """The quarter x, y >= 0 of a tube along z, with the radii ``inner`` and ``outer`` and a ``length`` [mm].
 
-    ``counts`` are the numbers of cells through its wall, around the quarter and along it. Faces: inner, outer, x0, y0, bottom, top.
+    ``counts``: the numbers of cells through the wall, around the quarter and along the tube. Faces: inner, outer, x0, y0, bottom,
+    top.
     """
 
     def place(unit: Floats) -> Floats:
@@ -156,10 +157,10 @@ def tube_quarter(inner: float, outer: float, length: float, counts: Counts, kind
 
 
 def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, degree: int) -> Cells:
-    """The octant x, y, z >= 0 of a hollow sphere of radii ``inner`` and ``outer`` [mm].
+    """The octant x, y, z >= 0 of a hollow sphere with the radii ``inner`` and ``outer`` [mm].
 
-    It has three patches of ``n`` by ``n`` cells, with ``layers`` of cells through the wall. A patch is equiangular: its lines are
-    great circles at equal angles. Faces: inner, outer, x0, y0, z0.
+    It has three patches of ``n`` by ``n`` cells, with ``layers`` of cells through the wall. The patches are equiangular: their
+    lines are great circles at equal angles. Faces: inner, outer, x0, y0, z0.
     """
 
     def wall(_: Floats, direction: Floats, depth: Floats) -> Floats:
@@ -169,8 +170,9 @@ def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, d
 
 
 def _patches(place: Callable[[Floats, Floats, Floats], Floats], counts: Counts, ends: dict[str, str]) -> list[Brick]:
-    """Three blocks of an octant around its corner. ``place`` maps points (n, 3) on outer faces of the unit cube, unit vectors
-    (n, 3) at even angles along an edge, and the fraction (n, 1) of the path outward to points; ``ends``: the faces z0 and z1.
+    """Three blocks of an octant around its corner. ``place``: a function from points (n, 3) on the outer faces of the unit cube,
+    unit vectors (n, 3) at even angles along an edge, and the fraction (n, 1) of the path outward, to points (n, 3) [mm]. ``ends``:
+    the regions on the faces z0 and z1.
     """
 
     def patch(axis: int) -> Brick:
@@ -188,12 +190,15 @@ def _patches(place: Callable[[Floats, Floats, Floats], Floats], counts: Counts, 
 
 
 def _square(flat: Floats, half: float) -> Floats:
-    """Points (n, 2) of the rounded square of half side ``half`` in the unit disc, from ``flat`` (n, 2) in [-1, 1]."""
+    """Points (n, 2) in the unit disc, of the rounded square of half side ``half``, for coordinates ``flat`` (n, 2) in [-1, 1]."""
     return np.asarray(half * flat * (1 + _BULGE * (1 - flat[:, ::-1] ** 2)))
 
 
 def _fan(unit: Floats, half: float, low: float, side: tuple[int, int]) -> Floats:
-    """Points (n, 2) between the circle and the side of the square with the normal ``side`` (axis, sign): x outward, y along it."""
+    """Points (n, 2) between a side of the square and the circle; in ``unit``, x is outward and y is along the side.
+
+    ``half``: half the side of the square; ``low``: the lower end of y; ``side``: the (axis, sign) of the normal of the side.
+    """
     axis, sign = side
     along = low + (1 - low) * unit[:, 1]
     square = _square(np.stack([np.ones_like(along), along], axis=1), half)
@@ -203,10 +208,10 @@ def _fan(unit: Floats, half: float, low: float, side: tuple[int, int]) -> Floats
 
 
 def _disc(place: Map, half: float, counts: Counts, faces: dict[str, str], *, quarter: bool) -> list[Brick]:
-    """Blocks of a body over the unit disc, or its quarter x, y >= 0: ``place`` takes (x, y, third in [0, 1]) to points [mm].
+    """Blocks of a body over the unit disc, or over its quarter x, y >= 0. ``place`` maps (x, y, third in [0, 1]) to points [mm].
 
-    A square of half side ``half`` is in the middle; ``counts``: the cells along half its side, from it to the circle, and along the
-    third coordinate; ``faces`` of the blocks: x1 is the rim, z0 and z1 the ends.
+    A square of half side ``half`` is in the middle. ``counts``: the numbers of cells along half the side of the square, from the
+    square to the circle, and along the third coordinate. ``faces``: the regions on x1, the rim, and on z0 and z1, the ends.
     """
     side, rings, layers = counts
     low, along = (0.0, side) if quarter else (-1.0, 2 * side)
@@ -227,9 +232,10 @@ def _disc(place: Map, half: float, counts: Counts, faces: dict[str, str], *, qua
 
 
 def cylinder(radius: float, length: float, rings: int, slices: int, kind: Kind, degree: int) -> Cells:
-    """A solid cylinder of a ``radius`` and a ``length`` [mm] along z from the origin.
+    """A solid cylinder with a ``radius`` and a ``length`` [mm] along z, beginning at the origin.
 
-    ``rings`` of cells surround a rounded square with twice as many cells along a side, in ``slices``. Faces: bottom, top, side.
+    In each of the ``slices``, ``rings`` of cells surround a rounded square with twice as many cells along each side. Faces: bottom,
+    top, side.
     """
     faces = {"z0": "bottom", "z1": "top", "x1": "side"}
     blocks = _disc(
@@ -239,7 +245,7 @@ def cylinder(radius: float, length: float, rings: int, slices: int, kind: Kind, 
 
 
 def _in_ventricle(disc: Floats) -> Floats:
-    """Points (n, 3) [mm] of the ventricle's wall, from x and y in the unit disc, whose rim is the base, and depth in the wall."""
+    """Points (n, 3) [mm] of the ventricle's wall, from x and y in the unit disc, whose rim is the base, and the relative depth."""
     depth = _WALL * disc[:, 2]
     short, long = _SHORT + depth, _LONG + depth
     radius = np.hypot(disc[:, 0], disc[:, 1])
@@ -253,24 +259,24 @@ _VENTRICLE = {"z0": "endo", "z1": "epi", "x1": "base"}
 
 
 def ventricle(counts: Counts, kind: Kind, degree: int) -> Cells:
-    """The truncated ellipsoid of Land et al. 2015: along z, its apex at z = -17 inside and -20 outside, cut at z = 5 [mm].
+    """The truncated ellipsoid of Land et al. 2015 along z. Its apex is at z = -17 inside and -20 outside; it is cut at z = 5 [mm].
 
-    ``counts``: the cells around an eighth of a turn, from the square at the apex to the base, and through the wall; their sizes are
-    similar for (2 n, 7 n, 2 n). Faces: endo, epi, base.
+    ``counts``: the numbers of cells around an eighth of a turn, from the square at the apex to the base, and through the wall. The
+    cells have similar sizes for (2 n, 7 n, 2 n). Faces: endo, epi, base.
     """
     return mapped(_disc(_in_ventricle, _SQUARE_IN_VENTRICLE, counts, _VENTRICLE, quarter=False), kind, degree)
 
 
 def ventricle_quarter(counts: Counts, kind: Kind, degree: int) -> Cells:
-    """The quarter x, y >= 0 of :func:`ventricle`, with the faces x0 and y0 too."""
+    """The quarter x, y >= 0 of :func:`ventricle`, with the additional faces x0 and y0."""
     return mapped(_disc(_in_ventricle, _SQUARE_IN_VENTRICLE, counts, _VENTRICLE, quarter=True), kind, degree)
 
 
 def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degree: int) -> Cells:
-    """The octant x, y, z >= 0 of a solid sphere of radius ``outer`` [mm].
+    """The octant x, y, z >= 0 of a solid sphere with the radius ``outer`` [mm].
 
-    It has a cube with ``n`` cells along each side, of length ``core`` [mm], at its centre, and around it ``layers`` of cells that
-    grow evenly from the cube to the sphere. Faces: outer, x0, y0, z0.
+    At its centre it has a cube with sides of length ``core`` [mm] and ``n`` cells along each side. Around the cube there are
+    ``layers`` of cells that grow by a constant factor from the cube to the sphere. Faces: outer, x0, y0, z0.
     """
     size, far = core / n, outer - core
     growth = scipy.optimize.brentq(lambda q: size * (q**layers - 1) / (q - 1) - far, 1 + 1e-9, 1 + far / size)

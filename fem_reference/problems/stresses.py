@@ -1,4 +1,4 @@
-"""Stresses in solved states from the energies of effects, including omitted effects, independent of any solver."""
+"""Stresses in solved states, from the energies of acting and of omitted effects. This module is independent of any solver."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,14 +23,15 @@ Acting = Sequence[tuple[Effect, float]]
 Shares = Mapping[str, Floats]
 NONE: Shares = MappingProxyType({})
 
-# The greatest number of sampled tetrahedra, evenly spread, and of points evaluated at once, so that their jets fit into a cache.
+# The maximum number of sampled tetrahedra, which are evenly spread, and the number of points evaluated at once, small enough for
+# their jets to fit into a cache.
 _MOST, AT_ONCE = 2048, 1024
-_SMALLEST = 0.05  # the least det F of sampled tetrahedra: curved tetrahedra may be inverted between their corners
+_SMALLEST = 0.05  # the minimum det F of sampled tetrahedra: curved tetrahedra may be inverted between their corners
 
 
 def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float = 0.0) -> Floats:
-    """``dW/dF`` (count, 3, 3) [MPa] at a ``state`` whose F consists of jets. W is the sum of the energies per unit rest volume of
-    the effects ``acting``, pairs (effect, amount), and of a stress ``at_rest``.
+    """The first Piola-Kirchhoff stress ``dW/dF`` (count, 3, 3) [MPa] at a ``state`` whose F consists of jets. W is the energy per
+    unit rest volume of the effects ``acting``, pairs (effect, amount), plus the energy ``at_rest`` of a stress at rest.
     """
     energy = total_energy(acting, state) + at_rest
     slope = energy.slope if isinstance(energy, Jet) else np.zeros((9, 1))
@@ -38,8 +39,10 @@ def first_piola(acting: Acting, state: State, count: int, at_rest: Jet | float =
 
 
 def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None, shares: Shares = NONE) -> Floats:
-    """The Kirchhoff stress ``dW/dF F^T`` (n, 3, 3) [MPa] of effects ``acting`` at deformation gradients ``F`` (n, 3, 3) with fibres
-    along ``fibre`` (n, 3) and ``shares`` (n,) in regions, without the pressure of the mixed form and effects that depend on time.
+    """The Kirchhoff stress ``dW/dF F^T`` (n, 3, 3) [MPa] of the effects ``acting``, pairs (effect, amount), at n points.
+
+    ``F`` (n, 3, 3): the deformation gradients; ``fibre`` (n, 3): the fibre directions; ``shares``: the shares (n,) in each region.
+    The pressure of the mixed formulation and effects that depend on time are not included.
     """
     found = np.zeros(F.shape)
     for start in range(0, len(F), AT_ONCE):
@@ -56,8 +59,8 @@ def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None, shares: Shares = 
 @dataclass(frozen=True)
 class StressSizes:
     """Sizes of stresses [MPa] in a state, root mean square over the volume. ``acts``: the stress of the acting effects without
-    pressure; ``added``: the change of stress by each other effect. ``stretch``: the least and the greatest stretch of fibres. NaN
-    if no tetrahedron has a positive volume.
+    pressure; ``added``: the change of stress that each of the other effects would cause. ``stretch``: the smallest and the greatest
+    fibre stretch. All values are NaN if no sampled tetrahedron has a det F above 0.05.
     """
 
     acts: float
@@ -66,7 +69,9 @@ class StressSizes:
 
 
 class StressSamples:
-    """Samples of the stress in tetrahedra of a ``mesh``, with ``fibre`` (m, 3) directions and the ``regions`` of effects."""
+    """Samples of the stress in the tetrahedra of a ``mesh``. ``fibre`` (m, 3): the fibre directions in the tetrahedra; ``regions``:
+    the regions in which effects act.
+    """
 
     def __init__(
         self, mesh: TetMesh, fibre: Floats | None, regions: Mapping[str, Region] = MappingProxyType({})
@@ -80,7 +85,10 @@ class StressSamples:
         self.shares = {name: region(middles) for name, region in regions.items()}
 
     def sizes(self, positions: Floats, acting: Acting, others: Acting) -> StressSizes:
-        """The sizes for the effects ``acting``, and each of the ``others`` added to these, with points at ``positions`` (n, 3)."""
+        """The sizes of the stress of the effects ``acting`` and of its change by each of ``others``.
+
+        ``positions`` (n, 3) [mm]: the positions of the points of the mesh.
+        """
         F = edge_vectors(positions[self.tets]) @ self.inverse
         good = np.linalg.det(F) > _SMALLEST
         if not good.any():
@@ -96,14 +104,17 @@ class StressSamples:
 
 
 def _added(acting: Acting, one: tuple[Effect, float], now: Floats, stress: Callable[[Acting], Floats]) -> Floats:
-    """The change of the stress ``now`` (n, 3, 3) by an effect: for an energy, its stress with the prestrains of ``acting``."""
+    """The change (n, 3, 3) of the stress ``now`` (n, 3, 3) of the effects ``acting`` that the further effect ``one`` would cause.
+
+    For an energy, it is the stress of this energy with the prestrains among ``acting``. ``stress``: the stress of any effects.
+    """
     if isinstance(one[0], Energy):
         return stress([*(other for other in acting if isinstance(other[0], Prestrain)), one])
     return stress([*acting, one]) - now if isinstance(one[0], Prestrain) else np.zeros(now.shape)
 
 
 def _stretches(acting: Acting, F: Floats, fibre: Floats | None, volumes: Floats) -> tuple[float, float]:
-    """The smallest and the greatest stretch of fibres in the energies, without a hundredth of the volume at either end."""
+    """The smallest and the greatest fibre stretch in the energies; a hundredth of the volume at each extreme is left out."""
     if fibre is None:
         return 1.0, 1.0
     state = elastic_state(acting, State([list(row) for row in np.moveaxis(F, 0, -1)], fibre=list(fibre.T)))
@@ -112,15 +123,16 @@ def _stretches(acting: Acting, F: Floats, fibre: Floats | None, volumes: Floats)
 
 
 def _mean(stress: Floats, volumes: Floats) -> float:
-    """The root mean square of the Frobenius norm, over the volume."""
+    """The root mean square, over the volume, of the Frobenius norm of a ``stress`` (n, 3, 3)."""
     return float(np.sqrt(((stress**2).sum(axis=(1, 2)) * volumes).sum() / volumes.sum()))
 
 
 class Watch:
-    """The influence, on successively solved frames, of effects that a ``case`` left out. ``frames``: the surface (n, 3) of each,
-    and the stresses in its tetrahedra, if any. The stresses of omitted and of acting effects follow from a state without another
-    solution. During a run, the stress of the acting effects is the ``known`` estimate or, if greater, the stress found so far; at
-    the end, it is the greatest stress found.
+    """A watch on the influence that the omitted effects of a ``case`` would have on the frames of a run, as these are solved.
+
+    The stresses of omitted and of acting effects follow from a solved state without another solution. They are compared with the
+    stress of the acting effects: during a run, with the maximum of the ``known`` estimate and the stresses so far; at the end, with
+    the maximum of all stresses. ``frames``: the surface (n, 3) of each frame, and the stresses in its tetrahedra, None without any.
     """
 
     def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:
@@ -142,14 +154,16 @@ class Watch:
         return [repr(one) for one in self.left]
 
     def see(self, number: float, surface: Floats, tets: Floats | None) -> tuple[Decision, ...]:
-        """The effects that matter in a frame, by its ``surface`` (n, 3) and the points ``tets`` (k, 3), if it has tetrahedra."""
+        """The decisions on the omitted effects that matter in the frame ``number``. ``surface`` (n, 3): the positions of its
+        surface; ``tets`` (k, 3): the positions of the points of its tetrahedra, None without tetrahedra.
+        """
         acting, others = ([(one, one.amount(number)) for one in some] for some in (self.case.effects, self.left))
         self.frames[number] = surface, None if tets is None else self.sampled.sizes(tets, acting, others)
         estimated = self.known.stress_tolerance
         return self._found(number, estimated if self._tense else max(estimated, STRESS_TOLERANCE * self._most()))
 
     def end(self) -> tuple[Decision, ...]:
-        """The effects that matter at the first frame at which any effect matters, once all stresses are known."""
+        """The decisions on the omitted effects that matter, at the first frame at which one does; empty if stresses are unknown."""
         if any(stresses is None for _, stresses in self.frames.values()):
             return ()
         tolerance = STRESS_TOLERANCE * max(self._most(), ROUNDING * self.known.shear)
@@ -172,7 +186,7 @@ class Watch:
         return tuple(replace(one, turned_out=number) for one in each if one.needed)
 
     def _decided(self, i: int, now: Estimates, stresses: StressSizes | None) -> Decision:
-        """The decision on an effect: by the stress that it adds in the tetrahedra, and for fibres by this stress only."""
+        """The decision on the omitted effect ``i``. The stress that it adds in tetrahedra counts; for fibres, only this stress."""
         effect = self.left[i]
         found = effect.indicator(now)
         assert found is not None  # every omitted effect has an indicator
@@ -182,7 +196,7 @@ class Watch:
         return decision(effect, found, now)
 
     def _moving(self, now: Estimates, number: float) -> Estimates:
-        """The estimates ``now``, with the speed of the surface up to a frame; loads with ramps move it too."""
+        """The estimates ``now``, updated with the motion of the solved surface up to frame ``number``, which loads cause too."""
         before = [earlier for earlier in sorted(self.frames) if earlier < number][-2:]
         if not before:
             return now

@@ -1,4 +1,4 @@
-"""Tendons as springs that only pull, from the surface of a muscle around the ends of its fibres to points of bones beyond it."""
+"""Tendons as springs that pull but do not push, from the surface of a muscle around its fibre ends to points on bones beyond it."""
 
 from collections.abc import Iterator
 
@@ -31,14 +31,14 @@ def check(body: Body) -> None:
 
 
 def pulling(rest: Setup, mesh: TetMesh, fibres: Polylines, effects: tuple[Effect, ...]) -> Iterator[Prescribed]:
-    """The springs of each effect ``tendon`` among ``effects``, for a set-up ``rest`` filled with a ``mesh`` and ``fibres``."""
+    """Yield the springs of each effect ``tendon`` among ``effects``. ``rest``, ``mesh``, ``fibres``: the set-up and its filling."""
     for effect in effects:
         if isinstance(effect, Tendon):
             yield _springs(effect, rest, mesh, fibres)
 
 
 def _springs(effect: Tendon, rest: Setup, mesh: TetMesh, fibres: Polylines) -> Prescribed:
-    """The springs of an ``effect``; InputError if no fibre continues as its tendon."""
+    """The springs of an ``effect``. Raises InputError if no fibre continues as its tendon."""
     number = [one.attachment for one in rest.attached].index(effect.on)
     entry, place = rest.attached[number], f"effect {effect.title}"
     if entry.tendon is None:
@@ -47,7 +47,7 @@ def _springs(effect: Tendon, rest: Setup, mesh: TetMesh, fibres: Polylines) -> P
     assert ends is not None  # there is an attachment
     beyond = (ends.by == number) & np.isfinite(ends.tendons[:, :, 0])
     if not beyond.any():
-        raise InputError(place, "no fibre that continues as this tendon", "fibres that end beside the attachment")
+        raise InputError(place, "no fibre that continues as this tendon", "fibres that end near the attachment")
     away, _ = cKDTree(ends_of(fibres)[beyond]).query(rest.surface.points)
     shares = attached_shares(rest.surface, np.setdiff1d(np.flatnonzero(away <= effect.reach), rest.attached_vertices))
     skin = attached_skin(rest.surface, shares, mesh, spacing(rest.surface))

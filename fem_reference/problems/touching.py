@@ -1,4 +1,4 @@
-"""Contact between parts of a body's surface on separate pieces of its mesh (several bodies in one), or of one part with itself."""
+"""Contact between parts of a body's surface: on separate pieces of its mesh (several bodies in one), or of one part with itself."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,16 +16,23 @@ from fem_reference.problems.contact import penalty, remaining
 
 @dataclass(frozen=True)
 class Touching:
-    """Contact, with any sliding, between two parts of the surface of a body, ``one`` and ``other``: regions of its facets, by name.
-    The pressure per rest area follows ``ContactLaw`` with ``stiffness`` k [MPa/mm] and ``smoothing`` d [mm], for the gap between
-    points of either part and the present surface of the other. Under pressure p the parts overlap by p / k. ``friction``: the
-    coefficient of Coulomb's law, as in ``ContactLaw``; None without friction. ``relaxed``: two frame numbers over which an overlap
-    at rest is removed, as with bones. If None, an overlap of two parts presses at once, and an overlap of a part with itself only
-    after it has opened. ``around``: True if points of either part also touch the skin around the other part, such as
-    attached skin; otherwise a point that slides past the rim of the other part ends the run. This skin has no contact points, so
-    contact there is half as stiff: the mean traction is half the reported pressure, and half the area counts. ``own_normals``: True
-    if the gap is measured along the points' own normals instead of to the nearest place, between two parts without friction: slip
-    is counted from the nearest place, and behind a part that touches itself is this part.
+    """A law of contact, with finite sliding, between two parts of the surface of a body.
+
+    ``one``, ``other``: the names of the two parts among the regions of facets; the same name for contact of a part with itself. The
+    pressure per unit rest area follows ``ContactLaw`` with ``stiffness`` k [MPa/mm] and ``smoothing`` d [mm]. The gap is measured
+    between points of each part and the present surface of the other part. Under the pressure p the overlap is at most p / k.
+    ``friction``: the coefficient of Coulomb's law, as in ``ContactLaw``; None without friction.
+
+    ``relaxed``: two frame numbers between which an overlap at rest is removed, as with bones. If it is None, an overlap of two
+    parts causes pressure at once, and an overlap of a part with itself causes pressure only after it has opened.
+
+    ``around``: True if points of each part also touch the skin around the other part, such as attached skin. Otherwise a point that
+    slides past the rim of the other part ends the run. The skin around a part has no contact points, so contact there is half as
+    stiff: the mean traction is half the reported pressure, and half the area counts.
+
+    ``own_normals``: True if the gap is measured along the normals of the points instead of to the nearest point. This requires two
+    different parts, because behind a part that touches itself is the part itself, and no friction, because slip is measured from
+    the nearest point.
     """
 
     one: str
@@ -39,32 +46,32 @@ class Touching:
 
     @property
     def forces(self) -> tuple[str, str]:
-        """The names of the forces on ``one`` and on ``other``, under which a frame reports them."""
+        """The names under which frames report the force on ``one`` and the force on ``other``."""
         return f"{self.other} on {self.one}", f"{self.one} on {self.other}"
 
     @property
     def pressure_name(self) -> str:
-        """The name under which a frame of several laws reports the greatest pressure of this law."""
+        """The name under which frames report the maximum pressure of this law, if there are several laws."""
         return pressure_name(self.one, self.other)
 
     def allowance(self, frame: float) -> float:
-        """The share of the overlap at rest that is subtracted at ``frame``. For a part with itself it is 1, unless the overlap is
-        removed, so that there is no pressure at rest.
+        """The fraction of the overlap at rest that is subtracted from the overlap at ``frame``. Unless the overlap is removed
+        gradually, it is 1 for a part that touches itself, so that there is no pressure at rest, and 0 for two parts.
         """
         return float(self.one == self.other) if self.relaxed is None else remaining(self.relaxed, frame)
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] at gaps (n,) [mm], and its derivative with respect to the gap [MPa/mm]; NaN if the gap is NaN."""
+        """The pressure (n,) [MPa] at each ``gap`` (n,) [mm], and its derivative with respect to the gap; NaN if the gap is NaN."""
         return penalty(gap, self.stiffness, self.smoothing)
 
 
 def pressure_name(one: str, other: str) -> str:
-    """The name under which a frame of several laws reports the greatest pressure between two parts."""
+    """The name under which frames report the maximum pressure between two parts, if there are several laws."""
     return f"touching_pressure of {one} and {other}"
 
 
 def with_itself(acting: Sequence[Effect], part: str) -> tuple[Touching, ...]:
-    """The contact of a ``part`` with itself, if the effects ``acting`` in a single muscle include it."""
+    """The law of contact of a ``part`` with itself, if it is among the effects ``acting`` on a single muscle; otherwise empty."""
     law = among(acting)
     if law is None:
         return ()
@@ -72,9 +79,11 @@ def with_itself(acting: Sequence[Effect], part: str) -> tuple[Touching, ...]:
 
 
 def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[str, Ints], *, moved: bool) -> None:
-    """Raise InputError unless each law has a stiffness and a smoothing, and its two regions of ``facets`` (f, 3 or 4) belong to
-    separate pieces of the mesh of ``cells`` (m, k). They may also be the same region, in a body that does not begin ``moved``. No
-    pair of facets may be under two laws.
+    """Raise InputError unless all laws ``touching`` are valid.
+
+    The stiffness and the smoothing of a law must be positive. Its two parts, regions of ``facets`` (f, 3 or 4), must belong to
+    separate pieces of the mesh with ``cells`` (m, k), or be one region of a body that starts at rest (not ``moved``). No pair of
+    facets may be subject to two laws.
     """
     if not touching:
         return
@@ -91,14 +100,14 @@ def check_touching(touching: Sequence[Touching], cells: Ints, facets: Mapping[st
             raise InputError(f"touching[{i}]", got, "regions of separate pieces, or one region with itself")
         if law.one == law.other and moved:  # it is unknown which side was in front
             raise InputError(
-                "start", f'places, and "{law.one}" that touches itself', "none, as such contact begins at rest"
+                "start", f'positions, and "{law.one}" that touches itself', "none, as such contact begins at rest"
             )
     _check_pairs(touching, facets, piece)
 
 
 def _check_pairs(touching: Sequence[Touching], facets: Mapping[str, Ints], piece: Ints) -> None:
-    """Raise InputError if a pair of facets, also of skin around a part, is under two laws, whose pressures would add up. ``piece``
-    (n,): the number of the piece of the mesh to which each point belongs.
+    """Raise InputError if a pair of facets is subject to two laws, whose pressures would add up. Facets of the skin around a part
+    are included. ``piece`` (n,): the number of the connected piece of the mesh to which each point belongs.
     """
     names = {name for law in touching for name in (law.one, law.other)}
     own = {name: set(sorted_corners(facets[name])) for name in names}
@@ -110,5 +119,5 @@ def _check_pairs(touching: Sequence[Touching], facets: Mapping[str, Ints], piece
             if all(shared) or (
                 skins and all(len(np.intersect1d(piece[facets[a]], piece[facets[b]])) for a, b in sides)
             ):
-                got = f'"{other.one}" and "{other.other}" with facets that touch under touching[{i}], too'
+                got = f'"{other.one}" and "{other.other}" with facets that also touch under touching[{i}]'
                 raise InputError(f"touching[{j}]", got, "one law for a pair of facets")

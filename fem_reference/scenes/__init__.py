@@ -1,1 +1,1 @@
-"""Cases as frozen records, and the reading of their files."""
+"""Cases as frozen records, and functions that read them from files."""

@@ -1,6 +1,6 @@
-"""The keys and behaviour of every case; cases of muscles and of scalar fields add further keys.
+"""The keys and methods that all cases share; muscle cases and scalar cases add further keys.
 
-``Case.key`` identifies a case by everything that determines its solution, including the content of its files.
+``Case.key`` is a hash of everything that determines the solution of a case, including the contents of its files.
 """
 
 import hashlib
@@ -20,21 +20,22 @@ from fem_reference.foundations.markup import fact_table
 from fem_reference.foundations.records import FileName, Name, Record, join
 
 DATA_SETTING = "FEM_REFERENCE_DATA"
-# The environment variable with further folders, separated as in PATH, from which scene files may read files.
+# The environment variable that lists further folders from which scene files may read files, separated as in PATH.
 ALLOWED_SETTING = "FEM_REFERENCE_FILES"
 COMMAND = "command"  # the solver that runs a program; a scene file cannot choose this solver
-DELAUNAY = "delaunay"  # the word that replaces the name of a file of triangles
-# Settings of solvers that change the time but not the result.
+DELAUNAY = "delaunay"  # the word that stands in place of the name of a file of triangles
+# Solver settings that affect the computing time but not the results.
 MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
 
-# Standards of a measurement: the reference (its rest state for the reference itself), the exact solution, or the run itself.
+# The standards against which a run is measured: the reference (for the reference itself, its rest state), the exact solution, or
+# the run itself.
 Standard = Literal["reference", "exact", "itself"]
 # Parts of a run that can be measured.
 Part = Literal["surface", "lines", "field"]
 
 
 def home(package: Path) -> Path:
-    """The folder of cases/ and meshes/: inside an installed package, next to it in a checkout."""
+    """The folder with ``cases`` and ``meshes``: the package itself if it is installed, or its parent folder in a checkout."""
     return package if (package / "cases").is_dir() else package.parent
 
 
@@ -42,7 +43,7 @@ HOME = home(Path(__file__).resolve().parent.parent)
 
 
 class SolverChoice(Record):
-    """A solver by name with its own settings, which the solver checks."""
+    """The name of a ``solver``. All further keys are settings of this solver, which checks them."""
 
     model_config = ConfigDict(frozen=True, extra="allow")
     solver: str
@@ -54,16 +55,19 @@ class SolverChoice(Record):
 
 
 class Candidate(SolverChoice):
-    """A run to compare with the reference."""
+    """A candidate: a ``solver`` whose results are compared with the reference under a ``name``. All further keys are settings of
+    the solver.
+    """
 
     name: FileName
 
 
 class Expectation(Record):
-    """A ``truth`` that a measure of this case must meet ``within`` a tolerance.
+    """A condition on a run: a measure must differ from its ``truth`` by at most ``within``.
 
-    ``of``: ``"reference"``, a candidate, or ``"candidates"`` for all compared ones; ``statistic``: optional if the metric has
-    only one; ``frame``: a number or ``"any"``; ``truth`` and ``within``: text with a unit, or numbers if the metric has no unit.
+    ``of``: ``"reference"``, the name of a candidate, or ``"candidates"`` for all compared candidates. ``statistic``: optional if
+    the metric has only one. ``frame``: a frame number, or ``"any"`` for every frame. ``truth`` and ``within``: text with a unit, or
+    numbers if the metric has no unit. ``kind``: the source of the truth. ``because``: the reason for the expectation.
     """
 
     of: str
@@ -77,7 +81,7 @@ class Expectation(Record):
 
 
 class NegativeControl(Record):
-    """One change to this case that must turn its verdict into fail: the ``key`` to change and its new ``value``."""
+    """One change to this case that must turn its verdict into fail: the ``key`` to change, its new ``value``, and the reason."""
 
     key: str
     value: str | int | float
@@ -85,10 +89,12 @@ class NegativeControl(Record):
 
 
 class Case(Record):
-    """A case, read and checked: the keys of its file, its ``name`` and its ``folder``. ``place`` names its file in messages;
-    ``from_file``: True if it has a file. ``quick``: changes by key for a faster, less accurate solution, as in tests. ``unsolved``:
-    the reason why the reference ends before the last frame, if it does. ``decisions``: with ``effects = "auto"``, for each effect
-    of the file, whether the case needs it and why.
+    """A case that was read and checked.
+
+    ``quick``: new values by key, for a faster and less accurate solution, as in tests. ``unsolved``: the reason, if the reference
+    does not reach the last frame. Some fields are not keys of the case file: the ``name`` of the case; its ``folder``; ``place``,
+    the name of its file in messages; ``from_file``, True if it was read from a file; and, with ``effects = "auto"``, the
+    ``decisions``: for each effect in the file, whether the case needs it and why.
     """
 
     title: str
@@ -106,7 +112,7 @@ class Case(Record):
     from_file: bool = Field(default=False, exclude=True)
     decisions: tuple[Any, ...] = Field(default=(), exclude=True)
 
-    # The task of its solvers, the parts of its runs, the keys that determine its solution, and keys that name files.
+    # The task of the solvers, the parts that a run consists of, the keys that determine the solution, and the keys that name files.
     task: ClassVar[Literal["solve", "solve_field"]]
     carries: ClassVar[frozenset[Part]]
     determined_by: ClassVar[frozenset[str]]
@@ -123,12 +129,12 @@ class Case(Record):
         return ()
 
     def expecting(self, more: tuple[Expectation, ...]) -> Self:
-        """The case that expects ``more``."""
+        """A copy of the case to which the expectations ``more`` are added."""
         return self.model_copy(update={"expect": (*self.expect, *more)})
 
     @property
     def acting(self) -> dict[str, Any]:
-        """The effects by their names, distinct in this case."""
+        """The effects by title, which is unique within the case."""
         return {getattr(effect, "title", type(effect).__name__): effect for effect in self.effects}
 
     @property
@@ -137,12 +143,12 @@ class Case(Record):
         raise NotImplementedError(f"{type(self).__name__} has no frames")
 
     def standards(self, of: str) -> frozenset[Standard]:  # noqa: ARG002
-        """The standards against which a run ``of`` a candidate or of the ``"reference"`` is measured."""
+        """The standards against which a run is measured. ``of``: the name of a candidate, or ``"reference"``."""
         return frozenset({"reference", "itself"})
 
     @property
     def facts(self) -> dict[str, str]:
-        """The contents of the case in words, by name."""
+        """A summary of the case in words, by heading."""
         raise NotImplementedError(f"{type(self).__name__} has no facts")
 
     def _repr_html_(self) -> str:
@@ -155,12 +161,16 @@ class Case(Record):
 
     @property
     def needed_data(self) -> list[str]:
-        """The files below the data folder that determine its solution."""
+        """The files in the data folder (``data:``) that determine the solution."""
         known = json.dumps(self.model_dump(mode="json", include=set(self.determined_by)))
         return sorted(set(re.findall(r'"data:([^"]+)"', known)))
 
     def file(self, text: str, key: str) -> Path:
-        """The file of a ``key``: below the data folder (``data:``), below meshes (``mesh:``), or relative to the case's folder."""
+        """The path of the file that the ``text`` of a ``key`` names.
+
+        A name that begins with ``data:`` is relative to the data folder, a name that begins with ``mesh:`` to the shipped meshes,
+        and any other name to the folder of the case. Raises InputError if the file does not exist or may not be read.
+        """
         place = join(self.place, key)
         if text.startswith("data:"):
             root = os.environ.get(DATA_SETTING)
@@ -178,7 +188,7 @@ class Case(Record):
         return path
 
     def _check_allowed(self, path: Path, place: str, text: str) -> None:
-        """Raise InputError if a scene file names a file that, after links are followed, is outside the folders it may read."""
+        """Raise InputError if a scene file names a file that is outside the folders it may read, once links are resolved."""
         if not self.from_file:
             return
         settings = os.pathsep.join(os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))
@@ -188,7 +198,7 @@ class Case(Record):
             raise InputError(place, f'"{text}", which is at {path.resolve()}', want)
 
     def check_solvers(self) -> None:
-        """Raise InputError if a scene file chooses the solver that runs a program."""
+        """Raise InputError if a scene file chooses the solver ``command``, which runs a program."""
         candidates = ((f"candidate[{i}]", one) for i, one in enumerate(self.candidate))
         for key, one in (("reference", self.reference), *candidates):
             if self.from_file and one.solver == COMMAND:
@@ -197,7 +207,9 @@ class Case(Record):
 
     @property
     def decides(self) -> list[Any]:
-        """Everything that affects verdicts: what determines solutions, and the judged solvers with settings that change results."""
+        """Everything that affects verdicts: the keys that determine the solution, the effects, and the name and the settings of
+        each judged solver, without settings that do not affect results.
+        """
         judged = {entry.of for entry in self.expect}
         others = [one for one in self.candidate if judged & {one.name, "candidates"}]
         solved = [
@@ -207,13 +219,13 @@ class Case(Record):
         return [self.model_dump(include={*self.determined_by, "choice"}), self.effects, solved]
 
     def determining(self) -> dict[str, Any]:
-        """The keys that determine the solution, besides the effects."""
+        """The keys that determine the solution and their values, without the effects."""
         return self.model_dump(mode="json", include=set(self.determined_by))
 
     @property
     def key(self) -> str:
-        """A hash of everything that determines the solution: the keys of ``determined_by``, the effects, the content of the files
-        named there, and the content of the files of effects outside the package.
+        """A hash of everything that determines the solution: the keys in ``determined_by``, the effects, the contents of the files
+        that they name, and the source files of effects that are defined outside the package.
         """
         tables = self.determining()
         tables["effect"] = [[type(effect).__name__, effect.model_dump(mode="json")] for effect in self.effects]
@@ -234,7 +246,9 @@ def _exists(path: Path) -> bool:
 
 
 def _unnamed(tables: Any, names: Collection[str]) -> Any:
-    """The ``tables`` with each file name reduced to its suffix, which determines how the file is read."""
+    """A copy of ``tables`` with each file name reduced to its suffix, which determines how the file is read. ``names``: the keys
+    whose values are file names.
+    """
     if isinstance(tables, dict):
         files = {name for name, text in tables.items() if name in names and isinstance(text, str) and text != DELAUNAY}
         return {name: Path(value).suffix if name in files else _unnamed(value, names) for name, value in tables.items()}
@@ -242,7 +256,7 @@ def _unnamed(tables: Any, names: Collection[str]) -> Any:
 
 
 def _files(tables: Any, names: Collection[str], key: str = "") -> Iterator[tuple[str, str]]:
-    """Every (key, text) below ``tables`` that names a file."""
+    """The key and the name of each file in ``tables``. ``names``: the keys of file names; ``key``: the key of ``tables`` itself."""
     if isinstance(tables, list):
         for i, value in enumerate(tables):
             yield from _files(value, names, f"{key}[{i}]")

@@ -1,4 +1,7 @@
-"""Strict reading of a case.toml as a Case: an unknown, missing or wrong key is an InputError that names the file and the key."""
+"""Strict reading of a ``case.toml`` as a ``Case``.
+
+An unknown key, a missing key or an invalid value raises an InputError that names the file and the key.
+"""
 
 from contextlib import suppress
 from copy import deepcopy
@@ -25,10 +28,10 @@ def cases() -> list[str]:
 
 
 def read(case: str | Path, *, with_negative_control: bool = False, changes: dict[str, Any] | None = None) -> Case:
-    """A shipped case by name, or the case in a folder or a file; a case with a ``domain`` has a scalar field.
+    """Read a shipped case by name, or the case in a folder or a file. A case with a ``domain`` has a scalar field.
 
-    ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values. ``with_negative_control`` applies the
-    negative control, which is checked even if it is not applied, except after changes of other keys.
+    ``changes``: new values by key, such as ``"frames.last"`` or ``"effect[1].bulk"``. ``with_negative_control``: True to apply the
+    negative control of the case. The negative control is checked even if it is not applied, unless only other keys are changed.
     """
     path = _scene_file(case)
     table = texts.toml(path)
@@ -61,7 +64,7 @@ def _scene_file(case: str | Path) -> Path:
 
 
 def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: bool = True) -> None:
-    """Change a key of a scene, or ``add`` a key to one of its tables."""
+    """Set a ``key`` in the ``table`` of a scene. If ``add`` is True, the key may be new in a table that exists."""
     *parents, last = numbers.parts(key)
     inside: Any = table
     try:
@@ -76,7 +79,7 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: boo
 
 
 def _near(table: dict[str, Any], parts: list[str | int]) -> str:
-    """The existing keys, for ``parts`` of a key that does not exist, as the end of a sentence."""
+    """The end of a message on the missing key with these ``parts``: the keys that exist there; empty if there are none."""
     inside: Any = table
     part: Any
     for i, part in enumerate(parts):
@@ -93,7 +96,7 @@ def _near(table: dict[str, Any], parts: list[str | int]) -> str:
 
 
 def setting(text: str) -> tuple[str, Any]:
-    """``KEY=VALUE`` of the command line as a key and a TOML value; any other value is text.
+    """Split ``KEY=VALUE`` of the command line into the key and the value, which is text unless it is valid TOML.
 
     >>> setting("candidate[1].peclet=10"), setting("domain.mesh.triangles=delaunay")
     (('candidate[1].peclet', 10), ('domain.mesh.triangles', 'delaunay'))
@@ -108,12 +111,12 @@ def setting(text: str) -> tuple[str, Any]:
 
 
 def read_muscle(case: str | Path, changes: dict[str, Any] | None = None) -> MuscleCase:
-    """The case of a muscle, with ``changes`` of its keys."""
+    """Read the case of a single muscle. ``changes``: new values by key."""
     return muscle(read(case, changes=changes))
 
 
 def muscle(case: Case, place: str | None = None) -> MuscleCase:
-    """The ``case`` itself if it is the case of a muscle; else InputError at ``place``, by default the file of the case."""
+    """The ``case`` itself, if it has a single muscle. Otherwise raises InputError at ``place``, by default the file of the case."""
     if not isinstance(case, MuscleCase):
         kind = "a case of several muscles" if isinstance(case, MusclesCase) else "a scalar case"
         raise InputError(place or case.place, f'"{case.name}", {kind}', "the case of a muscle")
@@ -121,7 +124,7 @@ def muscle(case: Case, place: str | None = None) -> MuscleCase:
 
 
 def _with_negative_control(case: Case, table: dict[str, Any], path: Path) -> Case:
-    """The ``case`` of ``table`` with its negative control applied; ``table`` is not changed."""
+    """The ``case`` with its negative control applied to a copy of its ``table``."""
     place, control = str(path), case.negative_control
     if control is None:
         raise InputError(join(place, "negative_control"), "None", "a key to change, its value and the reason")
@@ -148,7 +151,7 @@ def _check_negative_control(case: Case, changed: Case) -> None:
 
 
 def _wrong(case: Case, part: str, want: str) -> InputError:
-    """The error of a ``part`` of the negative control."""
+    """The InputError for a ``part``, key or value, of the negative control."""
     value = getattr(case.negative_control, part)
     got = f'"{value}"' if isinstance(value, str) else repr(value)
     return InputError(join(case.place, f"negative_control.{part}"), got, want)
@@ -159,7 +162,7 @@ def _scene(table: dict[str, Any], path: Path) -> Case:
 
 
 def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
-    """The case with the keys of ``table`` and the ``name``, ``folder`` and ``place`` of ``whose``."""
+    """The checked case with the keys of ``table``. ``whose``: ``name``, ``folder`` and ``place``, and ``from_file`` for a file."""
     place = str(whose["place"])
     table = alone(table, place)
     record: type[Case]
@@ -180,7 +183,7 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
 
 
 def with_numbers[C: Case](case: C, values: dict[str, float]) -> C:
-    """The ``case`` with other numbers by key, in their internal units, checked like a case from a file."""
+    """A copy of the ``case`` with new numbers, checked like a case from a file. ``values``: numbers by key, in internal units."""
     made = numbers.changed(case, values)
     _check_effects([name_of(one) for one in made.effect], made.effect, made.place)
     return _checked(made)
@@ -197,7 +200,10 @@ def _checked[C: Case](case: C) -> C:
 
 
 def with_effects(table: Any, place: str, kind: type[Record] = Effect) -> Any:
-    """The ``table`` with the effects of a ``kind`` below its key ``effect`` as records, each once; unchanged without a list."""
+    """A copy of ``table`` in which the tables under the key ``effect`` are replaced by records of a ``kind``.
+
+    Raises InputError if an effect is listed twice. Without a list of effects, ``table`` itself is returned.
+    """
     entries = table.get("effect") if isinstance(table, dict) else None
     if not isinstance(entries, list | tuple):
         return table
@@ -208,8 +214,10 @@ def with_effects(table: Any, place: str, kind: type[Record] = Effect) -> Any:
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
-    """Check that an effect acts once in each region (two effects of one name would share their unknowns) and a load once on each
-    part of the surface. No bulk modulus may be below the shear modulus of its region, as this is usually a mistake in units.
+    """Raise InputError if an effect acts twice in a region, or a load acts twice on a part of the surface.
+
+    Two effects with the same name would share their unknowns. A bulk modulus below the shear modulus in the same region is refused
+    too, as it is usually a mistake in units.
     """
     places = [region_of(effect) for effect in effects]
     acting = [(name, getattr(effect, "on", ""), at) for name, effect, at in zip(names, effects, places, strict=True)]
@@ -234,7 +242,7 @@ def _effect(table: Any, place: str, kind: type[Record]) -> Record:
 
 
 def _check_muscles(case: MusclesCase) -> None:
-    """Check that each muscle has its own name, that effects on all muscles are stated for all, and that each muscle is valid."""
+    """Raise InputError unless the names of muscles differ, contact is stated for all muscles, and each muscle is valid."""
     check_acting(case.effect, [bone.name for bone in case.bone], case.frames, case.place)
     others = [bone.name for bone in case.bone]
     others += [one.name for muscle in case.muscle for one in muscle.attachment]
@@ -243,9 +251,7 @@ def _check_muscles(case: MusclesCase) -> None:
     if case.expect:
         raise InputError(join(case.place, "expect"), "expectations of all muscles", "muscle[i].expect, for each muscle")
     if in_situ.among(case.effects) is not None:
-        raise InputError(
-            join(case.place, "effect"), '"in_situ" with several muscles', "muscles that rest without stress"
-        )
+        raise InputError(join(case.place, "effect"), '"in_situ" with several muscles', "muscles without stress at rest")
     runs = ["reference", "candidates", *(candidate.name for candidate in case.candidate)]
     for i, muscle in enumerate(case.muscle):
         used = [(f"muscle[{i}].expect[{k}].of", entry.of) for k, entry in enumerate(muscle.expect)]

@@ -1,4 +1,4 @@
-"""Checks of a muscle's case across its keys: names are unique and refer to something, and the muscle starts at rest."""
+"""Checks across the keys of a muscle case: names are unique, references exist, and the muscle is at rest at the first frame."""
 
 import numpy as np
 
@@ -12,14 +12,14 @@ from fem_reference.foundations.records import Record, check_once, check_used, jo
 from fem_reference.scenes import regions
 from fem_reference.scenes.muscle import Frames, MuscleCase
 
-# The name of the surface on which a load acts if it does not act on an attachment: the part that is not attached to bone.
+# The name of the part of the surface that is not attached to a bone. A load acts on this part or on an attachment.
 FREE = "free"
-# The stretch of fibres slightly shorter than in the given shape.
+# The stretch of fibres that are slightly shorter than in the given shape.
 _GIVEN = 1 - 1e-5
 
 
 def check_names(case: MuscleCase) -> None:
-    """Check that names are used once and refer to something."""
+    """Raise InputError unless names are unique and everything to which a name refers exists."""
     bones = [bone.name for bone in case.bone]
     attachments = [attachment.name for attachment in case.attachment]
     check_acting(case.effects, bones, case.frames, case.place)
@@ -36,7 +36,7 @@ def check_names(case: MuscleCase) -> None:
 
 
 def _check_loads(case: MuscleCase) -> None:
-    """Check that no load is on an exact attachment, where the bone would carry it and nothing would deform."""
+    """Raise InputError if a load acts on an exact attachment: the bone would carry it, and nothing would deform."""
     exact = [attachment.name for attachment in case.attachment if attachment.stiffness is None]
     for i, effect in enumerate(case.effects):
         if isinstance(effect, Load) and effect.on in exact:
@@ -45,13 +45,13 @@ def _check_loads(case: MuscleCase) -> None:
 
 
 def _check_forces(case: MuscleCase) -> None:
-    """Check that the names of forces are distinct, and that an attachment or an effect keeps the muscle from drifting."""
+    """Raise InputError if two forces would have the same name, or if neither an attachment nor an effect prevents drift."""
     bones = [bone.name for bone in case.bone]
     contact = among(case.effects) is not None
     for i, attachment in enumerate(case.attachment):
         if contact and attachment.name in bones:
             place = join(case.place, f"attachment[{i}].name")
-            raise InputError(place, f'"{attachment.name}", which a bone in contact has too', "a different name")
+            raise InputError(place, f'"{attachment.name}", which is also the name of a bone', "a different name")
     stays = any(isinstance(effect, Damping) or "momentum" in effect.needs for effect in case.effects)
     if not case.attachment and not stays:
         want = 'an attachment, however soft, or the effect "damping" or "inertia": otherwise the muscle drifts'
@@ -59,8 +59,9 @@ def _check_forces(case: MuscleCase) -> None:
 
 
 def check_rest(case: MuscleCase) -> None:
-    """Check that the muscle is at rest at the first frame: every bone is where its surface is, and no effect with a ramp acts,
-    unless a stress at rest balances it.
+    """Raise InputError unless the muscle is at rest at the first frame.
+
+    Every bone must be in the position of its surface file, and no effect with a ramp may act unless a stress at rest balances it.
     """
     for i, effect in enumerate(case.effects):
         acts = isinstance(effect, Ramped) and effect.amount(case.frames.first) != 0
@@ -78,9 +79,9 @@ def check_rest(case: MuscleCase) -> None:
 
 
 def _check_slack(case: MuscleCase) -> None:
-    """Check that passive fibres pull in the given shape only if a stress at rest balances them."""
+    """Raise InputError if passive fibres are in tension in the given shape and no stress at rest balances them."""
     for i, effect in enumerate(case.effects):
-        # Slightly below the given length, at which laws may have a kink.
+        # Slightly below the given length, because laws may have a kink at this length.
         pull = fibre_tension(effect.energy, _GIVEN) if isinstance(effect, PassiveFibres) else 0.0
         if not pull <= 0 and in_situ.among(case.effects) is None:
             want = 'slack fibres (an optimal_stretch of at least 1), or the effect "in_situ", which balances them'
@@ -89,7 +90,9 @@ def _check_slack(case: MuscleCase) -> None:
 
 
 def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, place: str) -> None:
-    """Check that bones have distinct names, contact is with at least one bone, and ``frames`` have an interval if time matters."""
+    """Raise InputError unless names of bones are unique, contact is with existing bones, the options of contact are compatible, and
+    ``frames`` have an interval if one of the effects ``acting`` depends on time.
+    """
     check_once(bones, join(place, "bone"))
     for i, effect in enumerate(acting):
         if isinstance(effect, Contact):

@@ -1,4 +1,4 @@
-"""The sources of a muscle's fibres in a case: a file, a Laplace field, or a decomposition of its volume."""
+"""Records of the fibres of a muscle, which come from files, a Laplace field, or a decomposition of the muscle's volume."""
 
 import math
 from functools import partial
@@ -9,22 +9,22 @@ from pydantic import AfterValidator, Field, model_validator
 from fem_reference.foundations.records import Record, directed, one_of
 from fem_reference.foundations.units import Angle, LengthUnit
 
-# Fibres of a template that is inclined by more than this angle [rad] would all be shorter than the muscle is wide.
+# The maximum pennation [rad]. With a greater pennation, all fibres of a template would be shorter than the muscle is wide.
 _STEEPEST = math.radians(60)
 
 
 class PolylineFile(Record):
-    """Fibres given as polylines in a file."""
+    """Fibres given as polylines in a ``file``, with coordinates in ``unit``."""
 
     file: str
     unit: LengthUnit
 
 
 class Traced(Record):
-    """Fibres traced along gradient lines of a Laplace field from the attachment ``start`` to ``end``.
+    """``count`` fibres, traced along the gradient of a Laplace field from the attachment ``start`` to the attachment ``end``.
 
-    With ``flux = "area"`` the flux per area of an attachment is constant, and fibres cover both attachments. Without it, the field
-    is 0 on the start and 1 on the end, and fibres are concentrated at the rims of wide attachments.
+    With ``flux = "area"`` the flux per unit area is constant over each attachment, and fibres cover both attachments. Without it,
+    the field is 0 on ``start`` and 1 on ``end``, and fibres are concentrated at the rims of wide attachments.
     """
 
     count: int = Field(gt=0, le=100_000)
@@ -34,8 +34,11 @@ class Traced(Record):
 
 
 class KohoutKukacka(Record):
-    """Fibres of a ``template`` in the unit cube, mapped to ``contours`` of the Laplace field between the attachments ``start``
-    and ``end``. Fibres of the template "pennate" are inclined by ``pennation`` in the direction ``towards`` across the muscle.
+    """Fibres of a ``template`` in the unit cube, mapped into the muscle. ``count``: the number of fibres.
+
+    The map uses a number of ``contours`` of the Laplace field between the attachments ``start`` and ``end``. The fibres of the
+    template "pennate" are inclined by the angle ``pennation`` to the direction along the muscle, towards the side of the muscle to
+    which the vector ``towards`` points.
     """
 
     count: int = Field(gt=0, le=10_000)
@@ -57,8 +60,10 @@ class KohoutKukacka(Record):
 
 
 class Chmd(Record):
-    """Fibres interpolated between fibres on the muscle's surface. ``heads``: a file for each head, with three or more fibres around
-    it. ``around``: instead of files, lines of the Laplace field just below the surface.
+    """Fibres interpolated between fibres on the surface of the muscle. ``count``: the number of fibres.
+
+    ``heads``: a file for each head of the muscle, with three or more fibres around the head. ``around``: instead of files, fibres
+    that are traced along a Laplace field just below the surface.
     """
 
     count: int = Field(gt=0, le=1000)
@@ -76,13 +81,14 @@ class FibreTurn(Record):
 
 
 class Fibres(Record):
-    """The fibres whose lengths are measured: exactly one of ``polylines``, ``traced``, ``kohout_kukacka`` and ``chmd``.
+    """The fibres of a muscle, given by exactly one of ``polylines``, ``traced``, ``kohout_kukacka`` and ``chmd``. Their lengths are
+    measured, and effects use their directions.
 
-    ``turned``: a rotation, the same everywhere, from the directions of the lines to the fibre directions of the material; lengths
-    are still measured along the lines.
+    ``turned``: a rotation from the directions of these fibres to the fibre directions of the material, the same at all points.
+    Lengths are still measured along the fibres as given.
 
-    ``complete``: fibre ends over 2 mm from an attachment without ``tendon`` are extended, in the muscle or along its surface, to
-    the nearest point of the attachment.
+    ``complete``: True to extend each fibre that ends more than 2 mm from its attachment, in the muscle or along its surface, to the
+    nearest point of the attachment. Fibres are not extended to an attachment with a ``tendon``.
     """
 
     polylines: PolylineFile | None = None
@@ -96,7 +102,7 @@ class Fibres(Record):
 
     @property
     def ends(self) -> dict[str, str]:
-        """The attachments between which the fibres run, by the key that names them; none for fibres from a file."""
+        """The names of the attachments between which the fibres run, by key; empty for fibres from files."""
         around = None if self.chmd is None else self.chmd.around
         between = {"traced": self.traced, "kohout_kukacka": self.kohout_kukacka, "chmd.around": around}
         return {

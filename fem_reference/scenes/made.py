@@ -15,15 +15,16 @@ from fem_reference.scenes.muscle import MuscleCase
 
 
 def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "case") -> Case:
-    """Make a case from the keys and tables of a ``case.toml`` (``cases/hip_flexion/case.toml`` explains each), without a file.
+    """Make a case from a ``table`` with the keys of a ``case.toml``, but without a file.
 
-    A ``table`` with a ``domain`` is the case of a scalar field; any other is the case of a muscle. Instead of text with a unit,
-    numbers in mm, N, MPa, s, rad and tonne are accepted too. Effects may be made by :func:`fem_reference.make_effect`.
-    ``candidate``, ``expect`` and ``negative_control`` may be left out. Files are named relative to ``folder``; pages show the
-    ``name``. An InputError for a missing, unknown or wrong key names the key, the given value and the expected value.
+    A table with a ``domain`` is the case of a scalar field; any other table is the case of a muscle. A quantity is text with a
+    unit, or a number in mm, N, MPa, s, rad and tonne. An effect is a table or a result of :func:`fem_reference.make_effect`. The
+    keys ``candidate``, ``expect`` and ``negative_control`` are optional. File names are relative to ``folder``. ``name``: the name
+    of the case on pages. Raises InputError if a key is missing, unknown or invalid; the message names the key, the given value and
+    the expected value. ``cases/hip_flexion/case.toml`` explains each key.
     """
     if not isinstance(table, Mapping) or not all(isinstance(key, str) for key in table):
-        raise InputError("case", said(table), "keys and tables, as a case.toml has them")
+        raise InputError("case", said(table), "keys and tables as in a case.toml")
     given, place = dict(table), path(folder, "folder").resolve()
     if "domain" not in given:
         given = _with_units(MuscleCase, given)
@@ -42,7 +43,10 @@ def _effect(entry: Any) -> Any:
 
 
 def _with_units(annotation: Any, value: Any, unit: str = "") -> Any:
-    """``value`` with every number as text with its unit, if the field of the records in ``annotation`` has a unit."""
+    """A ``value`` of type ``annotation`` in which each number is replaced by text with a unit, if its field has a unit.
+
+    ``unit``: the unit of ``value`` itself.
+    """
     if isinstance(value, Mapping):
         records = [kind for kind in kinds(annotation) if isinstance(kind, type) and issubclass(kind, Record)]
         fields = {name: field for record in records for name, field in record.model_fields.items()}

@@ -1,4 +1,4 @@
-"""The case of a muscle as frozen records: its bones and their motion, its effects, and the requested frames."""
+"""Frozen records of the case of a muscle: its surface, the bones and their motion, attachments and the requested frames."""
 
 import math
 from functools import partial
@@ -16,7 +16,7 @@ from fem_reference.scenes.case import Case
 from fem_reference.scenes.fibres import Fibres
 from fem_reference.scenes.regions import CaseRegion
 
-# The least error of the distance to a bone, and the least rounding, that a grid can resolve [mm].
+# The smallest error of the distance to a bone, and the smallest rounding, that a grid can resolve [mm].
 _FINEST = 1e-3
 MOST_FRAMES = 100_000
 LAST_FRAME = 1_000_000_000
@@ -26,7 +26,7 @@ Axis = Annotated[Vector, AfterValidator(partial(directed, name="an axis"))]
 
 
 class Keyframe(Record):
-    """The amount of a motion at a frame number: an ``angle`` or a ``distance``."""
+    """The amount of a motion at the frame number ``frame``: the ``angle`` of a rotation or the ``distance`` of a translation."""
 
     frame: float
     angle: Angle | None = None
@@ -34,7 +34,7 @@ class Keyframe(Record):
 
 
 class Motion(Record):
-    """A rotation about a fixed ``axis`` through a ``centre`` or a translation along a ``direction``, linear between keyframes."""
+    """A rotation about a fixed ``axis`` through ``centre``, or a translation along ``direction``, linear between ``keyframes``."""
 
     axis: Axis | None = None
     centre: Point | None = None
@@ -60,7 +60,7 @@ class Motion(Record):
         return self
 
     def poses(self) -> RigidMotion:
-        """The motion as poses over frame numbers."""
+        """The motion as a function of the frame number."""
         frames = tuple(key.frame for key in self.keyframes)
         axis = self.axis if self.direction is None else self.direction
         assert axis is not None  # a Motion record has an axis or a direction
@@ -75,7 +75,7 @@ class CaseHalfSpace(Record):
 
 
 class CaseBox(Record):
-    """A box about ``centre`` of outer ``size``, with edges along the axes; ``rounding``: the radius of edges and corners."""
+    """An axis-aligned box with a ``centre`` and outer edge lengths ``size``. ``rounding``: the radius of edges and corners."""
 
     centre: Point
     size: Point
@@ -90,14 +90,14 @@ class CaseBox(Record):
 
 
 class CaseSphere(Record):
-    """A sphere of ``radius`` about ``centre``."""
+    """A sphere with a ``centre`` and a ``radius``."""
 
     centre: Point
     radius: PositiveLength
 
 
 class Rod(Record):
-    """A capsule or a cylinder of ``radius`` about the segment from ``start`` to ``end``."""
+    """A capsule or a cylinder, with a ``radius`` and an axis from ``start`` to ``end``."""
 
     start: Point
     end: Point
@@ -111,9 +111,11 @@ class Rod(Record):
 
 
 class CaseBone(Record):
-    """A rigid body: a ``surface`` in a file with coordinates in ``unit``, or exactly one of the closed forms; without ``motion``
-    it is fixed. ``distance_error``: the allowed root-mean-square error of the distance, near the surface and before smoothing.
-    ``distance_rounding``: the standard deviation of a Gaussian filter that smooths it, as edges hinder sliding.
+    """A rigid body: a ``surface`` file with coordinates in ``unit``, or exactly one of the closed forms (``half_space``, ``box``,
+    ``sphere``, ``capsule``, ``cylinder``). Without a ``motion`` the bone is fixed.
+
+    ``distance_error``: the allowed root-mean-square error of the distance near the surface, before it is smoothed.
+    ``distance_rounding``: the standard deviation of the Gaussian filter that smooths it, because sharp edges hinder sliding.
     """
 
     name: Name
@@ -143,7 +145,7 @@ class CaseBone(Record):
 
 
 class CaseJoint(Record):
-    """A joint: the right-handed ``axis`` through a ``centre`` about which a ``bone`` rotates; its angle is 0 at the first frame."""
+    """A joint in which a ``bone`` rotates about an ``axis`` through ``centre``. Its right-handed angle is 0 at the first frame."""
 
     name: Name
     bone: str
@@ -152,8 +154,9 @@ class CaseJoint(Record):
 
 
 class Muscle(Record):
-    """The closed triangle surface of a muscle and the size of its tetrahedra. ``refinements``: how often each is cut into eight.
-    ``mesher``: ``"quality"`` for well-shaped tetrahedra, or ``"block"`` for a muscle that is an axis-aligned box.
+    """A muscle: its closed triangle ``surface``, with coordinates in ``unit``, and the size ``tet_size`` of its tetrahedra before
+    refinement. ``refinements``: the number of times that every tetrahedron is cut into eight. ``mesher``: ``"quality"`` for
+    well-shaped tetrahedra, or ``"block"`` for a muscle that is an axis-aligned box.
     """
 
     surface: str
@@ -164,21 +167,23 @@ class Muscle(Record):
 
 
 class VertexList(Record):
-    """Vertices of the muscle surface from a CSV file with lines ``vertex[,value]``; with ``value``, only lines with this value."""
+    """Vertices, numbered from 0, in a CSV ``file`` with lines ``vertex[,value]``; with a ``value``, only lines with this value."""
 
     file: str
     value: int | None = None
 
 
 class Shift(Record):
-    """A displacement ``by`` a distance ``along`` a direction."""
+    """A displacement by the distance ``by`` in the direction ``along``."""
 
     along: Annotated[Vector, AfterValidator(partial(directed, name="a direction"))]
     by: Length
 
 
 class Outline(Record):
-    """Vertices within ``reach`` of the patches that clouds of landmarks span on the bone; ``shift`` moves the clouds only."""
+    """The vertices of the muscle surface within the distance ``reach`` of patches on the bone. Each of the ``clouds`` of landmarks
+    in ``file`` spans a patch. ``shift``: a displacement of the landmarks alone.
+    """
 
     file: str
     unit: LengthUnit
@@ -188,7 +193,7 @@ class Outline(Record):
 
 
 class Landmarks(Record):
-    """The mean of a ``cloud`` of landmarks in a file."""
+    """The mean of the landmarks of a ``cloud`` in a ``file``."""
 
     file: str
     unit: LengthUnit
@@ -196,9 +201,12 @@ class Landmarks(Record):
 
 
 class Attachment(Record):
-    """The part of the muscle surface that is attached to a bone, given by exactly one of ``vertices``, ``within`` (a distance from
-    the bone) and ``outline``. With a ``stiffness``, springs attach it to the bone; without, it moves exactly with the bone.
-    Fibres that end beside it continue to a point of the bone as a straight ``tendon``, which pulls only with the effect ``tendon``.
+    """The part of the muscle surface that is attached to a ``bone``, given by exactly one of ``vertices``, ``within`` (a distance
+    from the bone) and ``outline``. Springs with a ``stiffness`` attach this part to the bone; without a ``stiffness``, it moves
+    exactly with the bone.
+
+    Fibres that end near the attachment, but more than 2 mm away from it, continue as a straight tendon to the point ``tendon`` on
+    the bone. The tendon pulls only if the effect ``tendon`` acts.
     """
 
     name: Name
@@ -213,8 +221,8 @@ class Attachment(Record):
 
 
 class Frames(Record):
-    """The requested frame numbers: ``first``, ``first + every``, ... up to ``last``. ``interval``: the time between two numbers,
-    needed only by ``inertia``, ``damping``, ``viscosity`` and recorded sequences with times.
+    """The requested frame numbers: ``first``, ``first + every``, ... up to ``last``. ``interval``: the time between consecutive
+    frame numbers n and n + 1, needed only by ``inertia``, ``damping``, ``viscosity`` and recorded sequences with times.
     """
 
     first: int = Field(ge=0)
@@ -236,14 +244,14 @@ class Frames(Record):
 
 
 class Uncertain(Range):
-    """The range of the number at a ``key`` of the case, such as ``effect[0].mu``, instead of the range stated by the effect."""
+    """The range, from ``low`` to ``high``, of the number at a ``key`` such as ``effect[0].mu``; it replaces the effect's range."""
 
     key: str
 
 
 class DrivenCase(Case):
-    """The case of one or several muscles driven by bones. Its key ``effects`` (``choice``) states whether all listed effects act,
-    or only those that the case needs: "auto".
+    """The case of one or several muscles driven by bones. ``choice`` (the key ``effects``): ``"listed"`` if all listed effects act,
+    ``"auto"`` if only the effects act that the case needs.
     """
 
     choice: Literal["listed", "auto"] = Field(default="listed", alias="effects")
@@ -263,7 +271,10 @@ class DrivenCase(Case):
 
 
 class MuscleCase(DrivenCase):
-    """The case of a muscle. ``effects``: all listed effects act, or, with "auto", only those that the case needs."""
+    """The case of a muscle. ``effect``: a table for each effect, with its ``name`` and its parameters. ``effects``: with
+    ``"listed"`` all of these effects act, with ``"auto"`` only the effects that the case needs. ``quick``: new values by key, for a
+    faster and less accurate solution. ``unsolved``: the reason, if the reference does not reach the last frame.
+    """
 
     muscle: Muscle
     attachment: tuple[Attachment, ...] = ()
@@ -280,7 +291,7 @@ class MuscleCase(DrivenCase):
 
     @property
     def facts(self) -> dict[str, str]:
-        """The contents of the case in words, by name."""
+        """A summary of the case in words, by heading."""
         return {
             "muscle": f"{self.muscle.surface}, tetrahedra of {self.muscle.tet_size / 2**self.muscle.refinements:g} mm",
             "bones": ", ".join(bone.name for bone in self.bone),

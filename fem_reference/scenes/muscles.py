@@ -1,4 +1,4 @@
-"""The case of several muscles, which share bones, frames and a reference, as frozen records; and each muscle as a case."""
+"""Frozen records of the case of several muscles, which share bones, frames and a reference, and its split into single muscles."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -16,15 +16,16 @@ from fem_reference.scenes.fibres import Fibres
 from fem_reference.scenes.muscle import Attachment, DrivenCase, Muscle, MuscleCase
 from fem_reference.scenes.regions import CaseRegion
 
-# Keys of each of several muscles; in a case of a single muscle they are keys of the case.
+# Keys that each of several muscles has in its table. In the case of a single muscle they are keys of the case.
 BESIDE = ("attachment", "fibres", "region", "expect")
-# The keys of the case that the cases of its muscles share.
+# Keys of the case that the separate cases of its muscles share.
 _SHARED = ("proves", "choice", "bone", "joint", "frames", "reference", "candidate", "folder", "from_file")
 
 
 class MuscleOfSeveral(Muscle):
-    """One of several muscles: its ``name``, also part of the names of its forces, and its tables. ``effect``: the effects that act
-    in this muscle only; ``expect``: its expectations.
+    """One of several muscles: the keys of ``Muscle``, and its own attachments, regions and fibres. ``name``: the name of the
+    muscle, with which the names of its forces begin. ``effect``: the effects that act on this muscle only. ``expect``: the
+    expectations of this muscle.
     """
 
     name: PartName
@@ -36,7 +37,11 @@ class MuscleOfSeveral(Muscle):
 
 
 class MusclesCase(DrivenCase):
-    """The case of several muscles; ``effect`` acts on all muscles."""
+    """The case of several muscles. ``effect``: a table for each effect that acts on all muscles, with its ``name`` and its
+    parameters. ``effects``: with ``"listed"`` all listed effects act, with ``"auto"`` only the effects that the case needs.
+    ``quick``: new values by key, for a faster and less accurate solution. ``unsolved``: the reason, if the reference does not reach
+    the last frame.
+    """
 
     muscle: tuple[MuscleOfSeveral, ...] = Field(min_length=2)
 
@@ -44,12 +49,12 @@ class MusclesCase(DrivenCase):
 
     @property
     def touching(self) -> MuscleContact | None:
-        """The contact between the muscles, None if there is none."""
+        """The effect of contact between the muscles; None without contact."""
         return among(self.effect)
 
     @property
     def apart(self) -> bool:
-        """True if muscles must not cross: contact acts between them, or was left out because they do not come near."""
+        """True if muscles must not cross: contact acts between them, or was left out because they do not come near each other."""
         return any(isinstance(one, MuscleContact) for one in (*self.effect, *(some.effect for some in self.decisions)))
 
     @property
@@ -59,13 +64,13 @@ class MusclesCase(DrivenCase):
 
     @property
     def acting(self) -> dict[str, Effect]:
-        """The effects by their names; the name of an effect on one muscle follows the name of the muscle."""
+        """The effects by title. The title of an effect on a single muscle begins with the name of the muscle."""
         own = {f"{muscle.name}: {one.title}": one for muscle in self.muscle for one in muscle.effect}
         return {one.title: one for one in self.effect} | own
 
     @property
     def facts(self) -> dict[str, str]:
-        """The contents of the case in words, by name."""
+        """A summary of the case in words, by heading."""
         return {
             "muscles": ", ".join(muscle.name for muscle in self.muscle),
             "bones": ", ".join(bone.name for bone in self.bone),
@@ -73,7 +78,9 @@ class MusclesCase(DrivenCase):
         }
 
     def determining(self) -> dict[str, Any]:
-        """The keys that determine the solution, without expectations; and ``apart``, which the second check uses."""
+        """The keys that determine the solution and their values, without expectations. If contact between the muscles was left out,
+        ``apart`` is included, because the second check depends on it.
+        """
         tables = super().determining()
         checked = {"apart": True} if self.apart and self.touching is None else {}
         own = [{key: own for key, own in one.items() if key != "expect"} for one in tables["muscle"]]
@@ -81,18 +88,18 @@ class MusclesCase(DrivenCase):
 
     @property
     def decides(self) -> list[Any]:
-        """Everything that affects verdicts, as for one muscle, without the expectations of single muscles."""
+        """Everything that affects verdicts, as in ``Case.decides``. A solver is judged if an expectation of any muscle names it."""
         judged = self.model_copy(update={"expect": tuple(one for muscle in self.muscle for one in muscle.expect)})
         return [self.determining(), *super(MusclesCase, judged).decides[1:]]
 
     def expecting(self, more: tuple[Expectation, ...]) -> Self:
-        """The case that expects ``more`` of each muscle."""
+        """A copy of the case in which the expectations ``more`` are added to each muscle."""
         muscles = (one.model_copy(update={"expect": (*one.expect, *more)}) for one in self.muscle)
         return self.model_copy(update={"muscle": tuple(muscles)})
 
     @contextmanager
     def placed(self, i: int) -> Iterator[None]:
-        """Give an InputError about the case of muscle number ``i`` its place in the scene."""
+        """A context that gives an InputError about the separate case of muscle ``i`` the corresponding place in the scene."""
         try:
             yield
         except InputError as error:
@@ -103,7 +110,9 @@ class MusclesCase(DrivenCase):
             raise InputError(join(self.place, key), error.got, error.want) from error
 
     def _key(self, i: int, key: str) -> str:
-        """The key in the scene for a ``key`` in the case of muscle number ``i``, where effects on all muscles come first."""
+        """The key in the scene that corresponds to ``key`` in the separate case of muscle ``i``. In the separate case, the effects
+        on all muscles precede the effects on this muscle.
+        """
         own, name = f"muscle[{i}].", key.partition(".")[0].partition("[")[0]
         shared = [k for k, one in enumerate(self.effect) if not isinstance(one, MuscleContact)]
         if match := re.match(r"effect\[(\d+)\]", key):
@@ -117,7 +126,7 @@ class MusclesCase(DrivenCase):
 
     @property
     def parts(self) -> tuple[MuscleCase, ...]:
-        """Each muscle as a separate case, without the others; these cases were checked when this case was read."""
+        """The separate case of each muscle. These cases are not checked again, as they were checked when this case was read."""
         everywhere, found = tuple(one for one in self.effect if not isinstance(one, MuscleContact)), list[MuscleCase]()
         for i, muscle in enumerate(self.muscle):
             made: dict[str, Any] = {name: getattr(self, name) for name in _SHARED}
@@ -130,18 +139,18 @@ class MusclesCase(DrivenCase):
 
 
 def muscles_of(case: DrivenCase) -> tuple[Muscle, ...]:
-    """The muscle of a case, or each of several."""
+    """The muscles of a case: one or several."""
     return case.muscle if isinstance(case.muscle, tuple) else (case.muscle,)
 
 
 def with_muscles[C: DrivenCase](case: C, change: Callable[[Muscle], Mapping[str, object]]) -> C:
-    """The case with the keys that ``change`` returns for its muscle, or for each of several."""
+    """A copy of the case with changes to each of its muscles. ``change``: a function from a muscle to its new values by key."""
     changed = [one.model_copy(update=change(one)) for one in muscles_of(case)]
     return case.model_copy(update={"muscle": tuple(changed) if isinstance(case.muscle, tuple) else changed[0]})
 
 
 def exactly_attached[C: DrivenCase](case: C) -> C:
-    """The case with exact attachments instead of springs."""
+    """A copy of the case with exact attachments instead of springs."""
 
     def exact(one: DrivenCase | Muscle) -> dict[str, object]:
         if not isinstance(one, MuscleCase | MuscleOfSeveral):
@@ -152,7 +161,10 @@ def exactly_attached[C: DrivenCase](case: C) -> C:
 
 
 def alone(table: dict[str, Any], place: str) -> dict[str, Any]:
-    """The ``table`` of a scene whose list has one muscle, rewritten as for a single muscle; unchanged if there are several."""
+    """The ``table`` of a scene, rewritten as for a single muscle if its list of muscles has one entry, otherwise unchanged.
+
+    Raises InputError that names ``place`` if the muscle and the scene state the same key.
+    """
     listed = table.get("muscle")
     if not isinstance(listed, list) or len(listed) != 1 or not isinstance(listed[0], dict):
         return table

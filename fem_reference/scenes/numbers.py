@@ -1,4 +1,4 @@
-"""Numbers of a case by their keys, such as ``effect[0].mu``: read, changed and named."""
+"""Numbers in a case, addressed by keys such as ``effect[0].mu``: reading, changing and naming them."""
 
 import re
 from typing import Annotated, Any
@@ -13,7 +13,7 @@ from fem_reference.scenes.case import Case
 
 
 def parts(key: str) -> list[str | int]:
-    """The parts of a ``key``, with positions in a list as numbers.
+    """The parts of a ``key``, with list indices as integers.
 
     >>> parts("effect[0].ramp[1].amount")
     ['effect', 0, 'ramp', 1, 'amount']
@@ -23,7 +23,7 @@ def parts(key: str) -> list[str | int]:
 
 
 def canonical(key: str) -> str:
-    """The canonical text of a ``key``.
+    """The canonical spelling of a ``key``.
 
     >>> canonical("effect.0.mu"), canonical("effect[00].ramp[1].amount")
     ('effect[0].mu', 'effect[0].ramp[1].amount')
@@ -32,7 +32,7 @@ def canonical(key: str) -> str:
 
 
 def number(case: Case, key: str) -> float:
-    """The number of a ``case`` at a ``key``, in its internal unit; InputError if there is none."""
+    """The number at a ``key`` of a ``case``, in its internal unit. Raises InputError if there is no number."""
     found = _along(case, key)[-1]
     if isinstance(found, bool) or not isinstance(found, float | int):
         got = "no value" if found is None else f"{type(found).__name__}"
@@ -41,12 +41,15 @@ def number(case: Case, key: str) -> float:
 
 
 def unit(case: Case, key: str) -> str:
-    """The internal unit of the number at a ``key``; empty if it has none."""
+    """The internal unit of the number at a ``key``; empty for a number without unit."""
     return field_unit(_field(case, key))
 
 
 def read(case: Case, key: str, value: str | float) -> float:
-    """A ``value`` for the number at a ``key``, as in scene files or in its internal unit; InputError if it is not valid."""
+    """Convert a ``value`` for the number at a ``key`` to the internal unit of this number.
+
+    ``value``: text with a unit as in scene files, or a number in the internal unit. Raises InputError if the value is invalid.
+    """
     field = _field(case, key)
     kind: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
     try:
@@ -59,8 +62,10 @@ def read(case: Case, key: str, value: str | float) -> float:
 
 
 def changed[C: Case](case: C, values: dict[str, float]) -> C:
-    """The ``case`` with other numbers by key, in their internal units. Each number and the records around it are checked as in a
-    scene file. :func:`fem_reference.scenes.casefile.with_numbers` also makes the checks across records.
+    """A copy of the ``case`` with new numbers. ``values``: the numbers by key, in internal units.
+
+    Each number and the records that contain it are checked as in a scene file. To make the checks across records too, use
+    :func:`fem_reference.scenes.casefile.with_numbers`.
     """
     for key, value in values.items():
         found: Any = read(case, key, value)
@@ -76,7 +81,7 @@ def changed[C: Case](case: C, values: dict[str, float]) -> C:
 
 
 def _with(record: Record, name: str, value: Any, place: str) -> Record:
-    """A ``record`` with another value, read again as from a file."""
+    """A copy of ``record`` with ``value`` in its field ``name``, checked as if read from a file at ``place``."""
     fields = type(record).model_fields
     stated = {one: getattr(record, one) for one in fields if one in record.model_fields_set} | {name: value}
     table = {fields[one].alias or one: _in_file(fields[one], inside) for one, inside in stated.items()}
@@ -84,7 +89,7 @@ def _with(record: Record, name: str, value: Any, place: str) -> Record:
 
 
 def _in_file(field: Any, value: Any) -> Any:
-    """A ``value`` of a field as files write it."""
+    """The ``value`` of a ``field``, as it is written in files."""
     readers = [one for kind in kinds(field.annotation) for one in getattr(kind, "__metadata__", ())]
     if any(getattr(one, "func", None) is length_unit for one in (*field.metadata, *readers)):
         return next((unit for unit, length in LENGTH_UNITS.items() if length == value), value)
@@ -92,7 +97,7 @@ def _in_file(field: Any, value: Any) -> Any:
 
 
 def title(case: Case, key: str) -> str:
-    """A ``key`` in words: effects and other entries by their names, such as ``neo_hooke mu`` for ``effect[0].mu``."""
+    """A ``key`` in words, in which list entries are replaced by their names: ``neo_hooke mu`` for ``effect[0].mu``."""
     words = list[str]()
     for part, inside in zip(parts(key), _along(case, key)[1:], strict=True):
         if isinstance(inside, Effect):
@@ -105,16 +110,19 @@ def title(case: Case, key: str) -> str:
 
 
 def _field(case: Case, key: str) -> Any:
-    """The field of a record that contains the number at a ``key``."""
+    """The pydantic field of the number at a ``key``."""
     number(case, key)
     owner, name = _along(case, key)[-2], parts(key)[-1]
     if not isinstance(owner, Record):
-        raise InputError(join(case.place, key), "a number of a list", "the key of a number with a name")
+        raise InputError(join(case.place, key), "a number in a list", "the key of a number with a name")
     return type(owner).model_fields[str(name)]
 
 
 def _along(case: Case, key: str) -> list[Any]:
-    """The ``case`` and the values along the parts of a ``key``, each inside the previous one; InputError if one does not exist."""
+    """The ``case``, then for each part of the ``key`` the value at this part, which is inside the previous value.
+
+    Raises InputError if one of these values does not exist.
+    """
     found: list[Any] = [case]
     for part in parts(key):
         inside = found[-1]

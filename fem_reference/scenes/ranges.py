@@ -1,4 +1,4 @@
-"""The unknown parameters of a case: the ranges stated by its effects, and the ranges stated by the case."""
+"""The unknown parameters of a case and their ranges, from its effects or from the case itself."""
 
 import re
 
@@ -8,7 +8,7 @@ from fem_reference.foundations.records import join
 from fem_reference.scenes import numbers
 from fem_reference.scenes.muscle import MuscleCase
 
-# Keys of numbers, besides effects, whose change does not affect the measured lines, bones and frames.
+# Keys outside of effects whose numbers may vary, because they do not affect the measured fibres, bones and frames.
 _OTHERS = re.compile(r"attachment\[\d+\]\.(stiffness|outline\.shift\.by)|fibres\.turned\.angle")
 _VARIED = (
     "a number of an effect, the stiffness or outline.shift.by of an attachment, or fibres.turned.angle: "
@@ -17,7 +17,7 @@ _VARIED = (
 
 
 def ranges(case: MuscleCase) -> dict[str, Range]:
-    """The ranges by key: the published ranges of the parameters of its effects, unless the case states its own."""
+    """The ranges of the unknown parameters, by key. A range that the case states replaces the published range of the effect."""
     stated = {
         f"effect[{i}].{name}": one for i, effect in enumerate(case.effects) for name, one in effect.published.items()
     }
@@ -27,7 +27,7 @@ def ranges(case: MuscleCase) -> dict[str, Range]:
 
 
 def left_out(case: MuscleCase) -> list[str]:
-    """The keys of the numbers of its effects that have no range."""
+    """The keys of the numerical parameters of effects that have no range."""
     known = ranges(case)
     found = [
         f"effect[{i}].{name}"
@@ -39,7 +39,10 @@ def left_out(case: MuscleCase) -> list[str]:
 
 
 def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, float]:
-    """The ends of a range of the number at a ``key``, in its internal unit; InputError at ``place`` if they are not numbers."""
+    """The lower and the upper end of the range ``one`` of the number at a ``key``, in the internal unit of the number.
+
+    Raises InputError that names ``place`` if the ends are invalid.
+    """
     found = []
     for name in ("low", "high"):
         try:
@@ -50,14 +53,14 @@ def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, flo
     if not low < high:
         raise InputError(f"{place}.high", f'"{one.high}"', f'more than low, "{one.low}"')
     if one.spread == "log-uniform" and not low > 0:
-        raise InputError(f"{place}.low", f'"{one.low}"', "more than zero, for a range of logarithms")
+        raise InputError(f"{place}.low", f'"{one.low}"', "more than zero, for a log-uniform range")
     if one.spread == "log-uniform" and not (own := numbers.number(case, key)) > 0:
         raise InputError(f"{place}.spread", f'"log-uniform" of {own:g}', '"uniform", as this number has no logarithm')
     return low, high
 
 
 def check(case: MuscleCase) -> None:
-    """Raise InputError if a ``case`` states a range with invalid ends, or for a key that is not one of its numbers."""
+    """Raise InputError if the ``case`` states a range with invalid ends, or for a key that is repeated, unknown or may not vary."""
     keys = list[str]()
     for i, entry in enumerate(case.uncertain):
         place = join(case.place, f"uncertain[{i}]")

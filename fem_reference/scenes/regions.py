@@ -1,4 +1,4 @@
-"""The regions of a muscle in a case, in which effects act: tendons, aponeuroses, fat, compartments."""
+"""Records of the regions of a muscle in which effects act, such as tendons, aponeuroses, fat and compartments."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -12,14 +12,14 @@ from fem_reference.foundations.units import Length, LengthUnit, PositiveLength
 
 
 class LengthFromAttachment(Record):
-    """The part whose distance from the patch of the attachment ``name`` is at most ``length``."""
+    """The part of the muscle within the distance ``length`` of the attached area of the attachment ``name``."""
 
     name: str
     length: PositiveLength
 
 
 class DepthBelowPatch(Record):
-    """The part whose distance from the triangles in a file is at most ``depth``."""
+    """The part of the muscle within the distance ``depth`` of the triangles in a ``file``."""
 
     file: str
     unit: LengthUnit
@@ -27,14 +27,16 @@ class DepthBelowPatch(Record):
 
 
 class ClosedSurface(Record):
-    """The part inside a closed triangle surface in a file."""
+    """The part of the muscle inside the closed triangle surface in a ``file``."""
 
     file: str
     unit: LengthUnit
 
 
 class LabelledTets(Record):
-    """The part inside the tetrahedra of a VTU or MSH file whose value in the cell array ``array`` is one of ``labels``."""
+    """The part of the muscle inside those tetrahedra of a VTU or MSH ``file`` that have one of ``labels`` in the cell array
+    ``array``.
+    """
 
     file: str
     unit: LengthUnit
@@ -43,7 +45,9 @@ class LabelledTets(Record):
 
 
 class ShareOfField(Record):
-    """The part in which the Laplace field, 0 on the attachment ``start`` and 1 on ``end``, is between ``first`` and ``last``."""
+    """The part of the muscle in which a Laplace field has values from ``first`` to ``last``. The field is 0 on the attachment
+    ``start`` and 1 on the attachment ``end``.
+    """
 
     start: str
     end: str
@@ -54,9 +58,10 @@ class ShareOfField(Record):
 
 
 class CaseRegion(Record):
-    """A part of the muscle at rest in which effects act (``in``), given by exactly one of ``attachment``, ``patch``, ``surface``,
-    ``tets`` and ``field``. The weight of the region's effects at a point (its share) grows from 0 at the border to 1 at a depth of
-    ``width``. Regions with the same name are united.
+    """A part of the muscle at rest, given by exactly one of ``attachment``, ``patch``, ``surface``, ``tets`` and ``field``.
+
+    An effect acts in a region if its key ``in`` names the region. At each point the effect is weighted by the share of the point in
+    the region, which grows from 0 at the border to 1 at a depth of ``width``. Regions with the same name are united.
     """
 
     name: Name
@@ -77,8 +82,8 @@ class CaseRegion(Record):
 
 
 def check(regions: Sequence[CaseRegion], effects: Sequence[Effect], attachments: Sequence[str], place: str) -> None:
-    """Raise InputError that names a key below ``place`` if one of the ``effects`` acts in a region that does not exist, or one of
-    the ``regions`` is at an attachment that is not among ``attachments``.
+    """Raise InputError if one of the ``effects`` acts in a region that does not exist, or if one of the ``regions`` refers to a
+    name that is not among ``attachments``. ``place``: the place of the case in messages.
     """
     laws = [
         (f"effect[{i}].in", region.removeprefix(REST)) for i, law in enumerate(effects) if (region := region_of(law))

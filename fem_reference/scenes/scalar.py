@@ -1,4 +1,4 @@
-"""A scalar case as frozen records: the domain of its field, its effects, its boundary conditions and its expectations."""
+"""Frozen records of a scalar case: the domain of its field, its boundary conditions and its elements."""
 
 from functools import partial
 from typing import Annotated, Literal, Self
@@ -16,7 +16,9 @@ _Nodes = Annotated[
 
 
 class Interval(Record):
-    """``count`` nodes from ``start`` to ``end``, both included; with a ``seed`` the inner nodes are at random positions."""
+    """An interval with ``count`` nodes from ``start`` to ``end``, both included. The inner nodes are evenly spaced or, with a
+    ``seed`` of random numbers, at random positions.
+    """
 
     start: float
     end: float
@@ -29,8 +31,8 @@ class Interval(Record):
 class MeshFiles(Record):
     """Triangles in the format of listing 4.5 of the report: comma-separated files without a header.
 
-    ``points``: a row of 2 or 3 coordinates for each vertex; ``triangles``: a row of three vertices, counted from 1, for each
-    triangle, or the word ``delaunay`` for a triangulation of points in the plane.
+    ``points``: a file with a row of 2 or 3 coordinates for each vertex. ``triangles``: a file with a row of three vertex numbers,
+    counted from 1, for each triangle; or the word ``delaunay`` for a Delaunay triangulation of points in the plane.
     """
 
     points: str
@@ -38,14 +40,14 @@ class MeshFiles(Record):
 
 
 class SurfaceFile(Record):
-    """A triangle surface in a mesh file; its coordinates are multiplied by ``scale``."""
+    """A triangle surface in a mesh ``file``, whose coordinates are multiplied by ``scale``."""
 
     file: str
     scale: float = Field(gt=0)
 
 
 class Domain(Record):
-    """The domain of the field: exactly one of ``interval``, ``nodes`` (given, increasing), ``mesh`` and ``surface``."""
+    """The domain of the field: exactly one of ``interval``, ``nodes`` (increasing coordinates), ``mesh`` and ``surface``."""
 
     interval: Interval | None = None
     nodes: _Nodes | None = None
@@ -56,12 +58,14 @@ class Domain(Record):
 
 
 class Boundary(Record):
-    """A boundary condition, in one of two forms.
+    """A boundary condition, in one of two forms. On parts of the boundary without a condition, the slope of the field is 0.
 
-    The first form applies ``on`` an end of an interval or on the ``rim`` (the boundary) of a triangle mesh. It gives the ``value``
-    of the field (Dirichlet) or its ``slope`` along the outward normal (Neumann). A formula ``where`` limits it to facets at whose
-    vertices the formula is positive. The second form is ``bounds``, a file in the format of listing 4.5 of the report: a row of
-    vertices, counted from 1, and a row of their fixed values. On all other parts of the boundary the slope is 0.
+    The first form has the key ``on``: an end of an interval, or the ``rim`` (the boundary) of a triangle mesh. It prescribes the
+    ``value`` of the field (Dirichlet) or its ``slope`` along the outward normal (Neumann). A formula ``where`` limits the condition
+    to facets at all of whose vertices the formula is positive.
+
+    The second form has the key ``bounds`` alone: a file in the format of listing 4.5 of the report, with a row of vertex numbers,
+    counted from 1, and a row of the values that are prescribed at these vertices.
     """
 
     on: Literal["left", "right", "rim"] | None = None
@@ -82,8 +86,8 @@ class Boundary(Record):
 
 
 class Element(Record):
-    """Lagrange elements of ``order`` 1 or 2, and the ``form``: plain ``galerkin``; ``supg``, stabilised along the flow; or
-    ``auto``, which is supg if the mesh Peclet number is above 1 anywhere, and galerkin otherwise.
+    """Lagrange elements of ``order`` 1 or 2. ``form``: ``galerkin``, without stabilisation; ``supg``, stabilised along the flow; or
+    ``auto``, which means ``supg`` if the mesh Peclet number is above 1 anywhere, and ``galerkin`` otherwise.
     """
 
     order: Literal[1, 2]
@@ -91,7 +95,10 @@ class Element(Record):
 
 
 class ScalarCase(Case):
-    """The case of a scalar field; ``exact`` is its solution, if known."""
+    """The case of a scalar field. ``effect``: a table for each effect, with its ``name`` and its parameters. ``exact``: the exact
+    solution, if it is known. ``quick``: new values by key, for a faster and less accurate solution. ``unsolved``: the reason, if
+    the reference does not solve the case.
+    """
 
     domain: Domain
     boundary: tuple[Boundary, ...] = ()
@@ -110,11 +117,11 @@ class ScalarCase(Case):
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """The only frame of a steady field."""
+        """The frame number of a steady field, which has only one frame."""
         return (0,)
 
     def standards(self, of: str) -> frozenset[Standard]:
-        """The standards against which a run ``of`` a candidate or of the ``"reference"`` is measured; a field has no rest state."""
+        """The standards against which a run is measured, for a field, which has no rest state; ``of``: as in ``Case.standards``."""
         found: set[Standard] = {"itself"}
         if self.exact is not None:
             found.add("exact")
@@ -124,7 +131,7 @@ class ScalarCase(Case):
 
     @property
     def facts(self) -> dict[str, str]:
-        """The contents of the case in words, by name."""
+        """A summary of the case in words, by heading."""
         (kind,) = (name for name, given in self.domain if given is not None)
         return {
             "domain": kind,

@@ -118,7 +118,7 @@ def test_an_end_beside_its_attachment_goes_on_by_the_tendon_of_it() -> None:
     assert_allclose(facts_of(given, found)["fibre_length_mean_mm"], (50 + np.sqrt(2290) + 5) / 2, rtol=1e-12)
     moved = ends_of(given) + [0, 0, 1]
     assert_allclose(found.beyond(moved, 5), [0, np.sqrt(160)], rtol=1e-12)
-    named = "last end of fibre 1, continued to top by a tendon: 5.0 mm from the attached area"
+    named = "last end of fibre 1, which continues to top as a tendon: 5.0 mm from the attached area"
     assert found.facts["fibre_ends_continued_by"] == named
     # 1 mm off the bone that rests, 9 mm off the bone that is lifted by 10, by a tendon or not.
     assert_allclose(found.off(moved, ends_of(given), 5), [[1, 9], [1, 9]], rtol=1e-12)

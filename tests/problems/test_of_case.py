@@ -81,7 +81,7 @@ def test_show_says_what_bones_are_and_how_they_move(squeezed, bar) -> None:
     assert facts["muscle"]["mesher"] == "block"
     assert facts["attachments"] == {}
     assert facts["bones"] == {
-        "floor": "half space of point (0, 10, 0), normal (0, 1, 0), mm, rests",
+        "floor": "half space of point (0, 10, 0), normal (0, 1, 0), mm, fixed",
         "lid": "box of centre (0, 140, 0), size (400, 100, 400), rounding 0, mm, slides along (0, -1, 0): "
         "0 mm at frame 0, 40 mm at frame 100",
     }

@@ -218,5 +218,5 @@ def test_a_body_with_laws_everywhere_is_as_it_should_be() -> None:
 
 
 def test_inertia_is_of_the_whole_body() -> None:
-    with pytest.raises(InputError, match="no region, as the whole body has inertia"):
+    with pytest.raises(InputError, match="no region, as the entire body has inertia"):
         make("inertia", density=1e-9, **{"in": "tendon"})

@@ -125,7 +125,7 @@ AXIS, ON = "[1, 0, 0]", "5, 5, 30"
     [
         ("[1, 0.01, 0]", ON, ("", ""), r"joint\[0\].axis: got .* want the axis of the bone's motion"),
         (AXIS, "5, 6, 30", ("", ""), r"joint\[0\].centre: got a point 1 mm off the axis"),
-        (AXIS, ON, ("lid", "floor"), r'joint\[0\].bone: got the bone "floor", which rests'),
+        (AXIS, ON, ("lid", "floor"), r'joint\[0\].bone: got the bone "floor", which is fixed'),
         (AXIS, ON, ("lid", "femur"), r'joint\[0\].bone: got "femur", want one of floor, lid'),
         (
             AXIS,

@@ -46,7 +46,7 @@ def test_skin_around_parts_is_under_one_law() -> None:
         (replace(LAW, one="low"), r'on: got "low", want a region of the body'),
         (
             replace(LAW, one="high_z0", other="low_z1"),
-            r'touching\[1\]: got "high_z0" and "low_z1" with facets that touch under t',
+            r'touching\[1\]: got "high_z0" and "low_z1" with facets that also touch under t',
         ),
         (replace(LAW, one="all", other="all"), r"touching\[1\]: got .*, want one law for a pair of facets"),
         ("low_z1", r"touching\[1\]: got str .*, want Touching records"),
@@ -66,7 +66,7 @@ def test_a_part_with_itself_feels_no_pressure_at_rest() -> None:
     assert [body(one).remembers for one in (LAW, itself)] == [False, True]
     moved = [replace(body(one), start=lambda points: points + [1.0, 0.0, 0.0]) for one in (LAW, itself)]
     check(moved[0], "P1")
-    with pytest.raises(fr.InputError, match='start: got places, and "low_z1" that touches itself'):
+    with pytest.raises(fr.InputError, match='start: got positions, and "low_z1" that touches itself'):
         check(moved[1], "P1")
     effect = fr.make_effect("touching", stiffness=2.0, smoothing=0.1, friction=0.2)
     assert with_itself((effect,), "free") == (fr.Touching("free", "free", 2.0, 0.1, 0.2),)

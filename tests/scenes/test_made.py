@@ -69,5 +69,5 @@ def test_what_is_wrong_with_a_case_made_in_python_is_named(tmp_path) -> None:
 
 def test_what_is_no_table_is_no_case() -> None:
     for table in (3, ["title"], {3: "title"}):
-        with pytest.raises(fr.InputError, match=r"case: got .*, want keys and tables, as a case\.toml has them"):
+        with pytest.raises(fr.InputError, match=r"case: got .*, want keys and tables as in a case\.toml"):
             fr.make_case(table)  # type: ignore[arg-type]

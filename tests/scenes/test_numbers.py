@@ -45,7 +45,7 @@ def test_a_changed_case_is_that_of_a_changed_file(bar: Path) -> None:
         ("title", "str"),
         ("attachment[0].stiffness", "no value"),
         ("", "nothing"),
-        ("bone[1].motion.axis[0]", "a number of a list"),
+        ("bone[1].motion.axis[0]", "a number in a list"),
     ],
 )
 def test_a_key_of_no_number_is_refused(bar: Path, key: str, message: str) -> None:

@@ -66,7 +66,7 @@ def test_what_runs_are_measured_with_is_not_varied(bar: Path, key: str) -> None:
 @pytest.mark.parametrize(
     ("c2", "low", "message"),
     [
-        ("1 kPa", "0 kPa", 'uncertain[0].low: got "0 kPa", want more than zero, for a range of logarithms'),
+        ("1 kPa", "0 kPa", 'uncertain[0].low: got "0 kPa", want more than zero, for a log-uniform range'),
         ("0 kPa", "1 kPa", 'uncertain[0].spread: got "log-uniform" of 0, want "uniform"'),
     ],
 )

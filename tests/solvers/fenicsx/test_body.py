@@ -53,16 +53,16 @@ def test_an_element_must_exist_and_fit_the_cells_and_the_effects() -> None:
         check(body, "P3")
     with pytest.raises(
         InputError,
-        match=r'element: got "Q1/P0", want an element for tetrahedron cells with a pressure, which .* brings: P1/P1, P2/P0, P2/P1',
+        match=r'element: got "Q1/P0", want an element for tetrahedron cells with a pressure, which .* needs: P1/P1, P2/P0, P2/P1',
     ):
         check(body, "Q1/P0")
     with pytest.raises(
-        InputError, match=r'got "P1", want an element for .* with a pressure, which .* brings: P1/P1, P2/P0, P2/P1'
+        InputError, match=r'got "P1", want an element for .* with a pressure, which .* needs: P1/P1, P2/P0, P2/P1'
     ):
         check(body, "P1")
     free = Body(box("Q1"), PENALTY, (), (0.0, 1.0))
     with pytest.raises(
-        InputError, match=r'got "Q2/Q1", want an element for .* without a pressure, which no effect brings: Q1, Q2'
+        InputError, match=r'got "Q2/Q1", want an element for .* without a pressure, which no effect needs: Q1, Q2'
     ):
         check(free, "Q2/Q1")
     for element in ELEMENTS:

@@ -188,7 +188,7 @@ def test_an_obstacle_and_an_attachment_have_names_of_their_own(tmp_path) -> None
     path.write_text(
         path.read_text().replace('name = "origin"', 'name = "floor"').replace('start = "origin"', 'start = "floor"')
     )
-    with pytest.raises(InputError, match=r'attachment\[0\]\.name: got "floor", which a bone in contact has too'):
+    with pytest.raises(InputError, match=r'attachment\[0\]\.name: got "floor", which is also the name of a bone'):
         casefile.read(path)
 
 

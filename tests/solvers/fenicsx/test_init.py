@@ -59,7 +59,7 @@ def test_both_ends_moved_alike_is_a_rigid_motion() -> None:
     [
         (
             {"element": "P1"},
-            'element: got "P1", want an element for tetrahedron cells with a pressure, which an effect brings',
+            'element: got "P1", want an element for tetrahedron cells with a pressure, which an effect needs',
         ),
         ({"element": "Q2/Q1"}, 'element: got "Q2/Q1", want an element for tetrahedron cells with a pressure'),
         ({"element": "P1/P1", "quadrature_degree": 1}, "quadrature_degree: got 1, want 2 or more for P1/P1"),

@@ -228,7 +228,7 @@ def test_what_cannot_be_solved_is_named() -> None:
     settings = ScikitBodySettings(element="P1")
     with pytest.raises(
         InputError,
-        match='element: got "P1", want an element for curved tetrahedron cells without a pressure, which no effect brings: P2',
+        match='element: got "P1", want an element for curved tetrahedron cells without a pressure, which no effect needs: P2',
     ):
         solve_body(Body(curved, law("P1"), (), (0.0, 1.0)), settings)
     with pytest.raises(InputError, match='on: got "lid", want a region of the body: x0, x1'):
