@@ -1,4 +1,4 @@
-"""Loader of a data set of muscles, with numpy alone; ``python load.py`` in its folder checks every file against its hash."""
+"""Loader of a data set of muscles, which needs only numpy; it checks every file of the data set against its hash."""
 
 import hashlib
 import json
@@ -8,7 +8,9 @@ import numpy as np
 
 
 def load(folder: str | Path, split: str = "pose", part: str = "train") -> list[tuple[dict[str, np.ndarray], list[int]]]:
-    """The scenes in a ``part`` ("train" or "test") of a ``split`` ("pose" or "shape"): arrays by name, and the rows in the part."""
+    """Load the scenes in a ``part`` ("train" or "test") of a ``split`` ("pose" or "shape"), each as its arrays by name and the rows
+    of frames that belong to the part. Raises ValueError if a file of the data set was changed.
+    """
     index = json.loads((Path(folder) / "dataset.json").read_text(encoding="utf-8"))
     for name, known in index["sha256"].items():
         if hashlib.sha256((Path(folder) / name).read_bytes()).hexdigest() != known:
