@@ -42,7 +42,7 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, err
     """Compare, for each of several muscles, its part of the common reference with the candidates that solve this muscle alone.
 
     Recorded frames are read from folders named after the muscles; a candidate may lack frames of some muscles. With ``error_bars``,
-    missing error bars are computed; otherwise only stored ones are used.
+    error bars are computed; otherwise only stored ones are used.
     """
     parts, found = bench.parts, dict[str, Comparison]()
     chosen = [(bench.found(*one), one[1]) for one in chosen]
