@@ -45,7 +45,8 @@ _SHARED: dict[str, dict[str, Any]] = {
     },
     "--error-bar": {
         "action": "store_true",
-        "help": "compute error bars of the reference: also solve it on larger tetrahedra, and with stiffer contact if it has any",
+        "help": "compute error bars of the reference: also solve it on larger tetrahedra and, if there is contact, with stiffer "
+        "contact",
     },
     "--negative-control": {
         "action": "store_true",

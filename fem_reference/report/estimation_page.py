@@ -51,7 +51,7 @@ def said(found: Estimation) -> str:
         sentences.append(
             f"{most} Gaussians deviate from a muscle's surface by "
             f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms, with "
-            f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer numbers"
+            f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer parameters"
         )
     return "; ".join(sentences) or "nothing was measured"
 
@@ -71,7 +71,7 @@ def _rows[Error](errors: Iterable[Error], *names: str) -> dict[tuple[object, ...
 
 
 def _figure() -> Drawing:
-    """The report's Figure 3.1: all techniques through the same points."""
+    """A drawing of the report's Figure 3.1: the curves of all techniques through the same points."""
 
     def draw(_: Figure, axes: Axes) -> None:
         for i, (name, (make, _smooth)) in enumerate(TECHNIQUES.items()):
@@ -114,7 +114,7 @@ def two_blobs(apart: float, size: int = 161) -> tuple[Floats, Floats, Floats]:
 
 
 def _blobs() -> Drawing:
-    """The report's Figure 7.1: two Gaussians that merge."""
+    """A drawing of the report's Figure 7.1: two Gaussians that merge."""
 
     def draw(_: Figure, axes: Axes) -> None:
         for i, apart in enumerate(_APART):

@@ -27,7 +27,8 @@ log = logging.getLogger(__name__)
 
 PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
 SECONDS = 600  # time limit of the drawing program
-# Principal moments with a smaller relative difference count as equal, and coordinate axes are used; it is far above round-off.
+# Principal moments count as equal if their relative difference is below this value, which is far above round-off. The cameras
+# then look along coordinate axes.
 _TIES = 1e-11
 
 

@@ -25,7 +25,7 @@ from fem_reference.report.words import title_of as in_words
 
 REFERENCE = "fenicsx"
 TIME = "seconds_per_frame"
-# The statistic in the tables, and the costs at equal values of which the errors of solvers are compared.
+# The statistic in the tables. The errors of solvers are compared at equal values of each of the costs ``MATCHED``.
 MAIN = next(map(".".join, described("rank")))
 MATCHED = (TIME, "peak_memory_mb", "unknowns")
 
@@ -69,7 +69,7 @@ def page(study: Study) -> Page:
 
 
 def shown(case: CaseStudy) -> list[str]:
-    """The statistics with a front: those with errors at two or more points (a case without joints has no moment arms, say)."""
+    """The statistics with a front: those with errors at two or more points. Moment arms, for example, require joints."""
     known = [name for point in case.points for name in point.errors]
     return [name for name in map(".".join, described("rank")) if known.count(name) > 1]
 
@@ -169,7 +169,7 @@ def front(case: CaseStudy, error: str) -> Drawing:
 
 
 def _draw_answers(axes: Axes, found: Iterable[Answer]) -> None:
-    """The limits of requests as lines, and the best setting of each as a numbered diamond."""
+    """Draw the limits of requests as lines, and the best setting for each request as a numbered diamond."""
     numbers = dict[tuple[float, float], list[str]]()
     for i, one in enumerate(found):
         for limit, line in ((one.limits.get("error"), axes.axhline), (one.limits.get("time"), axes.axvline)):

@@ -95,10 +95,10 @@ def verdict(one: Placed | None, unit: str) -> tuple[str, str]:
 
 
 def drawing(found: Uncertainty, band: Band) -> Drawing:
-    """A band over the frames, with the error bar of the reference and the candidates. The result of the case is subtracted from
-    every curve, because a band would otherwise often be too narrow to see.
+    """A drawing of a band over the frames, with the error bar of the reference and the candidates. The result of the case is
+    subtracted from every curve, because a band would otherwise often be too narrow to see.
     """
-    title = band.title if band.distance else f"{band.title}: difference from that of the case"
+    title = band.title if band.distance else f"{band.title}: difference from the result of the case"
     return over_frames(f"band-{band.quantity}", title, band.unit, partial(_draw, found, band))
 
 
@@ -133,7 +133,7 @@ def shares(found: Uncertainty, band: Band) -> Drawing:
 
     def draw(_: Figure, axes: Axes) -> None:
         places = np.arange(len(keys))
-        axes.barh(places, [100 * band.total[key] for key in keys], 0.7, color=_TOTAL, label="alone and with others")
+        axes.barh(places, [100 * band.total[key] for key in keys], 0.7, color=_TOTAL, label="with interactions")
         axes.barh(places, [100 * band.first[key] for key in keys], 0.4, color=_FIRST, label="alone")
         axes.set_yticks(places, [titles[key] for key in keys])
         axes.set(xlabel="% of the variance over all frames", xlim=(0, 105))

@@ -73,7 +73,7 @@ class Made:
 
 
 def each[S, T](scenes: Mapping[str, S], of: Callable[[S], T]) -> tuple[dict[str, T], dict[str, str]]:
-    """The results of the function ``of`` by name of the scene, and the error message of each scene that raised InputError."""
+    """Call the function ``of`` for each of ``scenes``. Return the results by name, and the messages of InputErrors by name."""
     found, missing = dict[str, T](), dict[str, str]()
     for name, scene in scenes.items():
         try:
@@ -170,7 +170,7 @@ def _loaded(folder: Path, trial: Trial) -> Run:
 def _executor(workers: Workers) -> Iterator[Executor]:
     """Processes of this machine, or the workers of a Dask scheduler, which gives the run of a dead worker to another worker."""
     if workers.address is None:
-        # Spawned processes, as numba, PETSc and locks do not survive a fork.
+        # Processes are spawned, because numba, PETSc and locks do not survive a fork.
         before = set(multiprocessing.active_children())
         with ProcessPoolExecutor(workers.count, mp_context=multiprocessing.get_context("spawn")) as executor:
             try:

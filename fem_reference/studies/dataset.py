@@ -192,7 +192,7 @@ def arrays(bench: Bench[MuscleCase], run: Run) -> Arrays:
 
 
 def _inside(run: Run, case: MuscleCase) -> Arrays:
-    """The arrays of the tetrahedra."""
+    """The arrays that describe the tetrahedra at rest and in each frame."""
     assert run.folder is not None  # it is in the store
     mesh, fibre = states.read_rest(run.folder)
     results = Results(mesh, case.effects, states.StoredStates(run.folder, run.numbers), fibre)

@@ -58,8 +58,8 @@ PULL = {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "lin
 COUNT, CONTOURS, AROUND = 20, 20, 12
 NEAR = 0.2  # [mm]: two fibres cross if they come nearer than this to each other away from their ends
 _ENDS = 0.1  # the fraction of a fibre that is left out at either end, where attachments bring fibres together
-_SAMPLED = 400  # sample points of a fibre
-_SAMPLES = 20_000  # random points in the box around a muscle
+_SAMPLED = 400  # the number of sample points of a fibre
+_SAMPLES = 20_000  # the number of random points in the box around a muscle
 _OUTSIDE = 1e-3  # [mm]: a point counts as outside the surface beyond this distance
 
 

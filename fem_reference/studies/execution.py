@@ -72,7 +72,7 @@ class Bench[C: Case]:
     @overload
     def problem(self) -> CaseProblem: ...
     def problem(self) -> CaseProblem:
-        """The problem of the case, meshed."""
+        """The problem of the case, with its mesh."""
         return self._problem()
 
     def of_muscle(self) -> "Bench[MuscleCase]":
@@ -83,7 +83,8 @@ class Bench[C: Case]:
     def found[S: SolverChoice](self, choice: S, place: str) -> S:
         """The ``choice`` with its setting ``folder``, if it has one, as a complete path.
 
-        A relative folder, or one that the scene itself names, must be a folder that the scene may read. ``place``: its key.
+        A relative folder, or one that the scene itself names, must be a folder that the scene may read. ``place``: the key of the
+        choice in the scene.
         """
         folder, named = choice.settings.get("folder"), choice in (self.scene.reference, *self.scene.candidate)
         if not isinstance(folder, str) or not (named or not Path(folder).is_absolute()):
@@ -152,7 +153,7 @@ class Bench[C: Case]:
         ``name``: the name of the run on pages; ``place``: the key of the scene that chooses the solver.
         """
         run = self._run(name, choice, place, self._made)
-        assert run is not None  # a run that is not stored is made
+        assert run is not None  # a run that is not stored is solved
         return run
 
     def reference(self) -> Run:
@@ -197,7 +198,7 @@ class Bench[C: Case]:
         return None if run is None else self._checked(run)
 
     def _made(self, wanted: Wanted) -> Run:
-        """Solve a run under a lock, so that only one process solves it; invalid input raises before anything is written."""
+        """Solve a run under a lock, so that only one process solves it; invalid input is reported before anything is written."""
         wanted.offer.require(wanted.settings)
         if self.scene.parts and wanted.choice.solver != "fenicsx":
             got = f'"{wanted.choice.solver}" for several muscles'

@@ -60,7 +60,7 @@ def _contents(source: Path, sizes: Collection[int]) -> Iterator[bytes]:
         if source.is_dir():
             paths = [path for path in source.rglob("*") if path.is_file() and path.stat().st_size in sizes]
             yield from (path.read_bytes() for path in paths)
-        elif texts.is_file(source) and tarfile.is_tarfile(source):  # before zip, as the last file in a tar may be a zip
+        elif texts.is_file(source) and tarfile.is_tarfile(source):  # before zip, as a tar may end with a zip
             with tarfile.open(source) as tar:
                 members = (tar.extractfile(one) for one in tar if one.isfile() and one.size in sizes)
                 yield from (member.read() for member in members if member)

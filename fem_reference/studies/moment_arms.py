@@ -20,7 +20,7 @@ from fem_reference.studies.campaign import each
 from fem_reference.studies.execution import Bench
 
 LARGER = 1.25  # a second run with tetrahedra larger by this factor shows the dependence of moment arms on the mesh
-_EVERY, _RAD = 10, 100  # the difference of successive frame numbers, and the frame numbers of a rotation by 1 rad
+_EVERY, _RAD = 10, 100  # the difference of successive frame numbers, and of those before and after a rotation by 1 rad
 NEMETH, BLEMKER = "nemeth_1985", "blemker_delp_2005"
 # Ranges of flexion [rad]: that of the shipped cases, and about -10 to 90 degrees, which ends where a reference does not converge.
 SHIPPED, WIDE = (0.0, 1.0), (-0.2, 1.6)

@@ -212,8 +212,8 @@ def _text(name: str, muscle: Surface, bones: dict[str, Surface], paths: dict[str
 
 
 def _joint(muscle: Surface, bones: dict[str, Surface], ends: tuple[_Attached, _Attached]) -> tuple[Floats, Floats]:
-    """A guess of the axis (3,) and the centre (3,) [mm] of the rotation between two bones. The axis is perpendicular to the muscle;
-    the centre lies between the nearest points of the bones.
+    """A guess of the axis (3,) and the centre (3,) [mm] of the rotation between two bones. The axis is perpendicular to the line
+    between the attachments; the centre lies midway between the nearest points of the bones.
     """
     first, second = (bones[end.bone].points for end in ends)
     away, which = cKDTree(first).query(second)

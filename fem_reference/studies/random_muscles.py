@@ -12,7 +12,7 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 
 EVERY = 10  # the difference of the frame numbers of successive poses
-_AROUND, _ALONG = 20, 21  # the number of vertices around and along a surface; vertex i corresponds on all surfaces
+_AROUND, _ALONG = 20, 21  # the number of vertices around and along each surface; vertices with equal index correspond
 _TETS = 150  # the approximate number of tetrahedra, each of which is then cut into eight
 _MOTION = "motion = {{ {kind}, keyframes = [{keys}] }}\n"
 _OBSTACLE = """

@@ -23,7 +23,7 @@ from fem_reference.solvers import fenicsx
 from fem_reference.solvers.common.protocol import MuscleSolver
 from fem_reference.studies.hard.records import REFERENCE, SECOND, Hard, Lattice, StepCounts, task_of
 
-_MOST_FOR_SECOND = 200  # tetrahedra that the second solver solves in seconds
+_MOST_FOR_SECOND = 200  # the maximum number of tetrahedra for scikit-fem, which solves these within seconds
 SAME = 0.01  # [%] of the body's size: the maximum distance between two states that count as the same
 _CUTS = 64  # the maximum factor by which a load step is reduced before the run ends as failed
 MOVED = 0.1  # the maximum random displacement of the points of a block, in cell sizes
@@ -164,7 +164,9 @@ def _shaken(block: Lattice, number: int) -> Lattice:
 
 
 def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solve) -> SameEnd:
-    """Run a case on ``count`` jittered meshes by ``solve``, and compare statuses and positions with those of the ``first`` run."""
+    """Solve a case on ``count`` jittered meshes by the function ``solve``, and compare the statuses, and the positions in common
+    frames, with those of the ``first`` run.
+    """
     begin, elsewhere, outcome, followed = time.process_time(), 0.0, *first
     ended, off, reached = Counter[str](), list[float](), list[int]()
     for number in range(1, count + 1):

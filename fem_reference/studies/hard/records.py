@@ -104,7 +104,7 @@ class Shipped(Record):
     changes: dict[str, Any] = Field(default_factory=dict)
 
     def read(self) -> Case:
-        """Read the case with its changes. Raises InputError if it is invalid."""
+        """Read the case with its changes. Raises InputError if the changed case is invalid."""
         quick = casefile.read(self.case).quick if self.quick else {}
         return casefile.read(self.case, changes=quick | self.changes)
 

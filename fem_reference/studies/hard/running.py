@@ -204,7 +204,9 @@ def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Fo
     hard, built = posed.hard, mechanical(posed.problem)
     if built is None or choice.solver != REFERENCE:
         return
-    asked = posed.in_steps and hard.start is None and not built.body.rubs  # with friction the end depends on the path
+    asked = (
+        posed.in_steps and hard.start is None and not built.body.rubs
+    )  # with friction the end state depends on the load path
     wanted = hard.steps or (following.farthest(followed) if asked else None)
     if wanted is not None:
         yield following.in_steps(built, choice, wanted)
