@@ -83,8 +83,8 @@ def _runs_of_several(case: Case, options: argparse.Namespace) -> int:
 
 
 def _with_states(bench: Bench[MuscleCase], *, again: bool) -> Run:
-    """The reference with its states. Raises InputError if the reference was solved without them, unless ``again`` is True, with
-    which it is solved again.
+    """The reference with its states. A reference that was solved without its states is solved again if ``again`` is True; otherwise
+    InputError is raised.
     """
     choice = bench.scene.reference
     if not hasattr(bench.settings(choice, "reference"), "store_state"):

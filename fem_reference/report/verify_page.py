@@ -21,10 +21,8 @@ from fem_reference.report.words import duration, number, words
 _OF_ENTRY = ("name", "group", "title", "unit", "kind", "relative", "because", "source", "negative_control")
 _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
 PASS, FAIL = "#14713a", "#b3261e"
-LEAST, GREATEST = (
-    1e-8,
-    1e3,
-)  # the range of error / tolerance in the overview; values outside the range are drawn at its edge
+# The range of error / tolerance in the overview; values outside the range are drawn at its edge.
+LEAST, GREATEST = 1e-8, 1e3
 _ROW = 0.175  # height of a row of the overview [in]
 
 
@@ -171,7 +169,7 @@ def drawable(one: Result) -> bool:
 
 
 def convergence(one: Result) -> Drawing:
-    """A drawing of error against mesh size on logarithmic axes. A line has the slope that is the integer nearest to the order."""
+    """A drawing of error against mesh size on logarithmic axes. The slope of a dashed line is the integer nearest to the order."""
     sizes, errors = _errors(one)
     order = one.finding.order
 

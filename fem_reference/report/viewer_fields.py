@@ -1,4 +1,4 @@
-"""Quantities for the 3D view in few bytes: colours of surfaces and fibres besides the distance to the same vertex, and arrows.
+"""Further data of the 3D view in few bytes: colours in addition to the distance to the same vertex, fibres, arrows and joints.
 
 quantities  name, signed, and top, the maximum magnitude [mm]: value = sign * top * (level / 127)^2
 runs        levels by quantity: (f, n) of one byte, as differences from the previous frame; most: the maximum magnitude by
@@ -83,7 +83,7 @@ class Fields:
         }
 
     def touched(self, run: Run) -> NDArray[np.bool_] | None:
-        """True (f, n) for each vertex within ``NEAR`` of a bone that is not attached; None if distances are not known."""
+        """True (f, n) for each vertex that is not attached but within ``NEAR`` of a bone; None if distances are not known."""
         gaps = self.gaps[run.name]
         return None if gaps is None else np.less_equal(gaps, NEAR)  # False for NaN
 

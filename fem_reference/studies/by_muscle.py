@@ -91,7 +91,9 @@ def of_part(entry: Candidate, place: str, muscle: str) -> Candidate:
 
 
 def _own(chosen: tuple[Candidate, str], name: str) -> tuple[Candidate, str] | None:
-    """A candidate and its place, for the muscle ``name``: recorded frames are in the folder of this muscle; None without one."""
+    """A candidate and its place, for the muscle ``name``. Recorded frames are those in the folder of this muscle; None if there is
+    no such folder.
+    """
     entry, place = chosen
     if entry.solver != "recorded":
         return chosen

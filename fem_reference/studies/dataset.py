@@ -3,7 +3,7 @@
 dataset.json               version, splits, the SHA-256 of every other file, and scenes that were left out, with the reason
 datacite.json              metadata in DataCite's schema 4.6
 load.py                    a loader that needs only numpy
-scenes/NAME/case.toml      the case, which ``fem-reference run scenes/NAME`` solves, and muscle.ply; no files for shipped cases
+scenes/NAME/case.toml      the case, which ``fem-reference run scenes/NAME`` solves, and muscle.ply; neither for shipped cases
            /frames.npz     the arrays of :func:`arrays`
            /bars.json      error bars of every statistic in each frame, and doubts, such as a small det F at an attachment's rim
 """

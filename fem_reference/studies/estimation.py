@@ -84,7 +84,7 @@ def estimate(cases: Iterable[MuscleCase], store: Path | None = None) -> Estimati
 
 
 def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:
-    """Errors of each technique over all fibres, for each number of known points that leaves at least two others on every fibre."""
+    """Errors of each technique over all fibres, for each number of known points that leaves two or more others on every fibre."""
     lines = [fibres.points[low:high] for low, high in pairwise(fibres.offsets)]
     for known in (count for count in KNOWN if all(len(line) >= count + 2 for line in lines)):
         for technique, (make, _) in TECHNIQUES.items():

@@ -57,7 +57,7 @@ def copied(case: str, folder: Path) -> None:
 
 
 def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | None) -> Unit:
-    """Write a scene with surfaces in mm into a new ``folder``, whose name the scene has; return the unit in which files were read.
+    """Write a scene with surfaces in mm into a new ``folder``, which names the scene; return the unit in which files were read.
 
     ``muscle`` and ``bones`` are files of triangles. The muscle is attached to the two bones nearest to it, of which the second
     moves. ``unit``: the unit of all files, one of ``LENGTH_UNITS``. If it is None, the unit is guessed: the only one that gives
@@ -142,7 +142,7 @@ def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
 
 def _welded(surface: Surface, unit: float) -> Surface:
     """The surface in mm with equal points merged, as STL files have three points for each triangle. ``unit``: its unit [mm]. The
-    order of points is kept, and triangles without area because of merged corners are removed.
+    order of points is kept, and triangles whose corners are merged with each other are removed.
     """
     points = surface.points * unit
     _, first, which = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)

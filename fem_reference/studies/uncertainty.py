@@ -110,7 +110,7 @@ def _rows(found: Sequence[Floats], like: Floats) -> Floats:
 
 
 def _surface(comparison: Comparison, context: MeasurementContext, design: Design, runs: Sequence[Run]) -> Band:
-    """The band of the rms distance over the area between the surface and the surface of the case with its own parameters."""
+    """The band of the rms distance of the surfaces of ``runs`` from that of the case itself, averaged over the area."""
     reference, bars = comparison.reference, comparison.error_bars
     title, frames = "Distance of the surface from that of the case, rms", len(reference.numbers)
     empty = _empty(comparison, ".".join(SURFACE), title, described()[SURFACE].unit, np.zeros(frames))

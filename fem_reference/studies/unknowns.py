@@ -26,7 +26,7 @@ class Unknowns:
         return self.at({})
 
     def at(self, values: dict[str, float]) -> MuscleCase:
-        """The case with other ``values`` by key, in internal units. Raises InputError if a case file could not have the values."""
+        """The case with other ``values`` by key, in internal units. Raises InputError if the values are invalid in a case file."""
         changed = casefile.with_numbers(self.whole, values)
         acting = tuple(changed.effect[i] for i in self.kept)
         return changed.model_copy(update={"effect": acting, "choice": "listed", "decisions": (), "uncertain": ()})
@@ -42,7 +42,7 @@ class Unknowns:
         for i, entry in enumerate(case.uncertain):
             if not self.acts(entry.key):
                 got = f'"{entry.key}", of {numbers.title(case, entry.key)}, which this case leaves out'
-                want = 'a number of an effect that acts, or effects = "listed"'
+                want = 'a parameter of an acting effect, or effects = "listed"'
                 raise InputError(join(case.place, f"uncertain[{i}].key"), got, want)
         for key, one in ranges.ranges(case).items():
             if self.acts(key):
@@ -50,7 +50,7 @@ class Unknowns:
                 named = numbers.title(case, key), numbers.unit(case, key), numbers.number(case, key)
                 found.append(Parameter(key, *named, low, high, one.spread, one.source))
         if not found:
-            want = 'a range of some number: [[uncertain]] with key, low, high and source, such as key = "effect[0].mu"'
+            want = 'a range of a parameter: [[uncertain]] with key, low, high and source, such as key = "effect[0].mu"'
             raise InputError(join(case.place, "uncertain"), "no parameter with a range", want)
         return tuple(found)
 

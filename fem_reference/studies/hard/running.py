@@ -36,9 +36,8 @@ log = logging.getLogger(__name__)
 
 # The minimum time [s] until a limit raises its exception again, long enough for the first exception to end the run.
 _AGAIN = 1.0
-LONGER = (
-    600.0  # the limit of processor time [s] if a case is repeated in several numbers of load steps or on several meshes
-)
+# The limit of processor time [s] if a case is repeated in several numbers of load steps or on several meshes.
+LONGER = 600.0
 # The pattern of a rest position [mm] in messages.
 _PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
 
@@ -204,9 +203,8 @@ def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Fo
     hard, built = posed.hard, mechanical(posed.problem)
     if built is None or choice.solver != REFERENCE:
         return
-    asked = (
-        posed.in_steps and hard.start is None and not built.body.rubs
-    )  # with friction the end state depends on the load path
+    # With friction the end state depends on the load path.
+    asked = posed.in_steps and hard.start is None and not built.body.rubs
     wanted = hard.steps or (following.farthest(followed) if asked else None)
     if wanted is not None:
         yield following.in_steps(built, choice, wanted)
