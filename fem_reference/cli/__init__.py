@@ -63,14 +63,14 @@ def main(arguments: list[str]) -> int:
 
 
 def _explain(message: str, options: argparse.Namespace) -> None:
-    """Print the page of the documentation that explains a message, if it exists, as in a checkout."""
+    """Print the path of the documentation page that explains a message, if the page exists; only a checkout has these pages."""
     found = page_of(message)
     if found and not options.quiet and (_CHECKOUT / found.partition("#")[0]).exists():
         print(f"see {found}", file=sys.stderr)
 
 
 def _why_broken(error: BaseException) -> str:
-    """The message for an unexpected exception: its text, its place, and a remedy."""
+    """The message for an unexpected exception: the text of the exception, its place in the code, and a remedy."""
     if isinstance(error, MemoryError):
         return "not enough memory; nothing was judged. Smaller input or larger tetrahedra need less memory"
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("fem_reference"):
@@ -90,7 +90,7 @@ def _why_broken(error: BaseException) -> str:
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
-    """Raise InputError if an output cannot be written, before anything is measured; creates nothing."""
+    """Raise InputError if an output cannot be written. The check comes before any measurement, and creates nothing."""
     _check_folder("--out", out(options), written=options.writes)
     if getattr(options, "to", None) is not None:
         _check_folder("--to", options.to.absolute().parent, written=True)
@@ -105,7 +105,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 def _check_name(name: str | None) -> None:
     """Raise InputError if ``--name`` cannot be the name of a page: the names of other files next to pages are reserved."""
-    from fem_reference.report.asked import LONGEST  # imported here, as packages that it needs may be missing
+    from fem_reference.report.asked import LONGEST  # imported here, because packages that it needs may be missing
 
     taken = ("runs", "docs", "index")
     if name is not None and (name in taken or not re.fullmatch(rf"\w[\w.=+-]{{0,{LONGEST - 1}}}", name)):
@@ -136,7 +136,7 @@ def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) 
 
 
 def write(path: Path | None, text: str) -> None:
-    """Write ``text`` to ``path``, if given, in a folder that is created if necessary."""
+    """Write ``text`` to ``path``, if a path is given; create its folder if necessary."""
     if path is not None:
         from fem_reference.io import files
 

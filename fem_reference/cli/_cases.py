@@ -1,4 +1,4 @@
-"""Cases on the command line: the choice of a case and its candidates, their pages, and the words that name these pages."""
+"""Cases on the command line: the choice of a case and its candidates, their pages, and the names of these pages."""
 
 import argparse
 from collections.abc import Iterable, Mapping
@@ -25,7 +25,7 @@ from fem_reference.studies.execution import Bench
 
 
 def scene_of(options: argparse.Namespace) -> Case:
-    """The case with the changes of ``--set``, the effects that it needs, and the expectations of ``--limit`` on all candidates."""
+    """The case with the changes of ``--set``, with the effects that it needs, and with the expectations of ``--limit``."""
     if options.negative_control and options.set:
         raise InputError("--negative-control", "this option with --set", "only one of the two")
     changes = dict(map(casefile.setting, options.set))
@@ -37,14 +37,14 @@ def scene_of(options: argparse.Namespace) -> Case:
 
 
 def muscle_case(case: str, options: argparse.Namespace, *, quick: bool) -> MuscleCase:
-    """The ``case`` of a muscle, at its ``quick`` size if requested; keys changed by ``--set`` take precedence."""
+    """The ``case`` of a muscle, with ``quick`` at its quick size; keys changed by ``--set`` take precedence."""
     given = dict(map(casefile.setting, options.set))
     sizes = casefile.read_muscle(case, given).quick if quick else {}
     return casefile.read_muscle(case, sizes | given)
 
 
 def _expectation(text: str, units: Mapping[str, str]) -> Expectation:
-    """The expectation that METRIC.STATISTIC=VALUE states for every candidate; ``units``: the units of all statistics, by name."""
+    """The expectation that METRIC.STATISTIC=VALUE states for every candidate. ``units``: the units of all statistics by name."""
     name, _, within = (part.strip() for part in text.partition("="))
     metric, dot, statistic = name.partition(".")
     if not dot or not within:
@@ -64,13 +64,15 @@ def _expectation(text: str, units: Mapping[str, str]) -> Expectation:
 
 
 def own_candidates(case: Case) -> list[tuple[Candidate, str]]:
-    """The candidates of the case, each with its place."""
+    """The candidates of the case, each with its key in the scene."""
     return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(case.candidate)]
 
 
 def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
-    """The candidate of the case with the name ``text``, else the recorded frames in the folder ``text``, else the solver of that
-    name with the settings of the page table-5-1; and the option that chooses it.
+    """The candidate that ``text`` names, and the key or option that chooses it.
+
+    ``text`` is the name of a candidate of the case, a folder of recorded frames, or the name of a solver, which has the settings of
+    the case or else those of the page table-5-1.
     """
     names = [candidate.name for candidate in case.candidate]
     if text in names:
@@ -87,7 +89,7 @@ def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
 
 
 def own_solver(options: argparse.Namespace, others: Iterable[Candidate | str] = ()) -> tuple[Candidate, ...]:
-    """The solver of ``--solver-command`` as a candidate, whose name must differ from all ``others``; none without the option."""
+    """The solver of ``--solver-command`` as a candidate; empty without the option. Its name must differ from all ``others``."""
     if options.solver_command is None:
         return ()
     own = command.choice(options.solver_command, Path.cwd(), "--solver-command")
@@ -110,7 +112,9 @@ def check_names(names: list[str]) -> None:
 
 
 def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[C]:
-    """The bench of a case; InputError for wrong expectations, solvers or names, and for error bars that cannot be computed."""
+    """The bench of a case, after checks. Raises InputError for wrong expectations, solvers or names, and if error bars are
+    requested but cannot be computed.
+    """
     if options.error_bar and not scene.parts:
         casefile.muscle(scene, "--error-bar")
     check_names([entry.name for entry, _ in chosen])
@@ -124,18 +128,18 @@ def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[t
 
 
 def case_part(case: Case) -> Part:
-    """The part of a page's name for its case: the name of a shipped case, else its folder."""
+    """The part of a page's name for its case: the name of a shipped case, or the folder of any other case."""
     return Part((case.name if case.folder.parent == HOME / "cases" else str(case.folder),))
 
 
 def changes(options: argparse.Namespace) -> tuple[Part, ...]:
-    """The changes of a case by ``--set`` and ``--negative-control``."""
+    """The parts of a page's name for the changes of its case by ``--set`` and ``--negative-control``."""
     control = (Part(("--negative-control",), "negative_control"),) if options.negative_control is True else ()
     return (*(Part(("--set", text), text) for text in getattr(options, "set", ())), *control)
 
 
 def asked(verb: str, case: Case, options: argparse.Namespace, page: str, *more: Part) -> Asked:
-    """The ``page`` of a case with its changes, and with ``more``."""
+    """The request for a ``page`` of a case with its changes; ``more``: further parts of the name of the page."""
     return Asked(verb, case.name, (case_part(case), *changes(options), *more), page)
 
 
@@ -158,14 +162,14 @@ def publish(options: argparse.Namespace, asked: Asked, page: Page, facts: dict[s
 
 
 def judged(bench: Bench[Case], options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Comparison:
-    """The runs of a case, measured and judged with error bars if these are requested or cheap."""
+    """Measure and judge the runs of a case, with error bars if these are stored, requested or cheap."""
     reference, *runs = bench.runs(chosen)
     bars = refinement.offered(bench, reference, asked=options.error_bar)
     return judging.compare(bench, reference, runs, bars)
 
 
 def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
-    """Measure and judge the ``chosen`` candidates, and write the page; bad input is reported before anything is solved."""
+    """Measure and judge the ``chosen`` candidates, and write the page. Invalid input is reported before anything is solved."""
     bench = checked_bench(case, options, chosen)
     if case.parts:
         return _compared_muscles(bench, options, chosen)
@@ -178,7 +182,7 @@ def compared(case: Case, options: argparse.Namespace, chosen: list[tuple[Candida
 
 
 def _page(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]], page: str) -> Asked:
-    """The ``page`` of a comparison; a page of the reference alone if the case has candidates and none is chosen."""
+    """The request for the ``page`` of a comparison, or of the reference alone if the case has candidates but none is chosen."""
     alone = bool(case.candidate) and not chosen
     who = (Part((), "reference"),) if alone else candidates(case, [entry for entry, _ in chosen])
     return asked("run" if alone else "compare", case, options, page, *who)

@@ -2,7 +2,7 @@
 
 import re
 
-# Patterns of messages, each with its page; the first match counts.
+# Patterns of messages, each with the page that explains them; the first match counts.
 PAGES = (
     ("FEniCSx is not installed", "getting_started.md"),
     ("--solver-command", "your_own_solver.md#your-solver-as-a-command"),

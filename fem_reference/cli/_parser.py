@@ -1,6 +1,6 @@
-"""The command line as a parser: a verb for every module of this folder whose name begins with a letter.
+"""The parser of the command line: every module in this folder whose name begins with a letter is a verb.
 
-A verb has ``HELP``, ``add_options(parser)``, and ``run(options)``, which prints and returns the exit status.
+A verb has ``HELP``, ``add_options(parser)``, and ``run(options)``, which prints the results and returns the exit status.
 """
 
 import argparse
@@ -18,7 +18,7 @@ CASE = "a shipped case (see list), a case folder or a case.toml"
 
 
 def positive(text: str) -> int:
-    """A whole number from 1 to 999999999.
+    """An integer from 1 to 999999999.
 
     >>> positive("2")
     2
@@ -45,7 +45,8 @@ _SHARED: dict[str, dict[str, Any]] = {
     },
     "--error-bar": {
         "action": "store_true",
-        "help": "compute error bars of the reference: also solve it on larger tetrahedra, and with stiffer contact if bones press",
+        "help": "compute error bars of the reference: also solve it on larger tetrahedra and, if there is contact, with stiffer "
+        "contact",
     },
     "--negative-control": {
         "action": "store_true",
@@ -86,13 +87,13 @@ def verb(name: str) -> ModuleType:
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
-    """The parser of the command line; with ``only``, with the options of that verb alone, as importing all takes seconds."""
+    """The parser of the command line; with ``only``, it has the options of this verb alone, as importing all takes seconds."""
     about = "Finite element reference and validation for muscle deformation."
     whole = argparse.ArgumentParser(prog="fem-reference", description=about)
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
     kinds = whole.add_subparsers(metavar="VERB", required=True)
     for name in names():
-        # The purpose of a verb is read from one line of its file, as importing or parsing the file takes a long time.
+        # The purpose of a verb is read from a single line of its file, as importing or parsing the file takes a long time.
         lines = (_FOLDER / f"{name.replace('-', '_')}.py").read_text(encoding="utf-8").splitlines()
         text = next(ast.literal_eval(line.removeprefix("HELP = ")) for line in lines if line.startswith("HELP = "))
         sub = kinds.add_parser(name, help=text, description=text)
@@ -113,7 +114,9 @@ def _add(verb: ModuleType, sub: argparse.ArgumentParser) -> None:
 
 
 class _Given(argparse.Action):
-    """The action of an option that may be given only once, as a second value would replace the first; lists drop repetitions."""
+    """The action of all options: an option may be given only once, as a second value would replace the first. An option with a list
+    may be repeated, and repeated values are dropped.
+    """
 
     def __call__(self, parser: Any, namespace: Any, values: Any, option_string: str | None = None) -> None:
         del parser

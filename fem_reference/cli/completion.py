@@ -10,7 +10,7 @@ from fem_reference.scenes import casefile
 
 HELP = "print a script with which a shell completes verbs, options and names of cases"
 _COMPLETE = "complete"  # the attribute of an action that shtab looks for
-# Commands that complete as ``fem-reference`` does, by the name that shtab gives its function.
+# Other commands that complete like ``fem-reference``, by shell; shtab determines the name of the function.
 _ALIASES = {
     "bash": "complete -o default -F _shtab_fem_reference fem-reference fem ./fem\n",
     "fish": "complete -c fem -w fem-reference\n",

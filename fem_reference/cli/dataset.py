@@ -16,7 +16,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="a new folder, or one of an interrupted build")
     parser.add_argument("--muscles", type=positive, default=24, metavar="N", help="random muscles (default: 24)")
     parser.add_argument(
-        "--poses", type=positive, default=12, metavar="N", help="poses of each muscle besides rest (default: 12)"
+        "--poses", type=positive, default=12, metavar="N", help="poses of each muscle in addition to rest (default: 12)"
     )
     parser.add_argument("--seed", type=positive, default=1, metavar="N", help="seed of the random numbers (default: 1)")
     share(parser, "--workers", "--scheduler")

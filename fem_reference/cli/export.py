@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _runs(case: MuscleCase, options: argparse.Namespace) -> int:
-    """Write the reference, with its states, and candidates for ParaView."""
+    """Write the reference with its states, and the candidates, for ParaView."""
     check(options.to)
     chosen = [choose(case, text, options.unit) for text in options.candidate]
     bench = checked_bench(case, options, chosen)
@@ -68,7 +68,7 @@ def _runs(case: MuscleCase, options: argparse.Namespace) -> int:
 
 
 def _runs_of_several(case: Case, options: argparse.Namespace) -> int:
-    """Write the reference and candidates of each muscle for ParaView, into a folder with its name; without states."""
+    """Write the reference and the candidates of each muscle for ParaView, without states, into a folder with the muscle's name."""
     check(options.to)
     if options.solve:
         raise InputError("--solve", "several muscles", "no such option: their states are not written")
@@ -83,7 +83,9 @@ def _runs_of_several(case: Case, options: argparse.Namespace) -> int:
 
 
 def _with_states(bench: Bench[MuscleCase], *, again: bool) -> Run:
-    """The reference with its states; InputError if it was solved without them, unless it is to be solved ``again``."""
+    """The reference with its states. A reference that was solved without its states is solved again if ``again`` is True; otherwise
+    InputError is raised.
+    """
     choice = bench.scene.reference
     if not hasattr(bench.settings(choice, "reference"), "store_state"):
         return bench.reference()

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _data(case: Case) -> str | None:
-    """The reason why the data of a case is missing, "" if it is present; None for a case without data."""
+    """The reason why the data of a case is missing, or "" if the data is present; None for a case that needs no data."""
     root = os.environ.get(DATA_SETTING)
     if not case.needed_data:
         return None
@@ -58,7 +58,7 @@ def _settings(name: str) -> dict[str, Any]:
     for offer in solvers.offers(name):
         fields = offer.settings.model_fields
         found |= {key: REQUIRED for key, field in fields.items() if field.is_required()}
-        stated = {*offer.settings.model_fields}  # not the computed hashes of files, as files may not exist
+        stated = {*offer.settings.model_fields}  # without the computed hashes of files, which may not exist
         found |= offer.settings.model_construct().model_dump(mode="json", include=stated, warnings=False)
     return found
 

@@ -75,7 +75,7 @@ def _table(options: argparse.Namespace) -> int:
     scenes = {scene.name: scene for scene in _scenes(options, table_5_1.SCENARIOS)}
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:
-        Bench(scenes[name], out(options)).setup()  # raises an error if a case that the user named lacks its data
+        Bench(scenes[name], out(options)).setup()  # raises an error if a case that the user has named lacks its data
     own = _cases.own_solver(options)
     for name in scenes if own else ():
         foreign.setdefault(name, []).extend(own)
@@ -141,7 +141,7 @@ _PAGES: dict[str, tuple[tuple[str, ...], Callable[[argparse.Namespace], int]]] =
 
 
 def _scenes(options: argparse.Namespace, names: Iterable[str]) -> list[MuscleCase]:
-    """The requested cases, else the cases ``names``."""
+    """The requested cases or, without a request, the cases ``names``."""
     return [_cases.muscle_case(name, options, quick=options.quick) for name in options.case or names]
 
 

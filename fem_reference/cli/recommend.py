@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _number(given: str, text: str, unit: str, place: str) -> float:
-    """A positive quantity from its ``text``, a part of the ``given`` value; messages quote the latter."""
+    """A positive quantity from its ``text``, which is a part of the ``given`` value; messages quote the ``given`` value."""
     try:
         value = in_unit(text, unit)
     except ValueError as error:

@@ -1,6 +1,6 @@
-"""Self-contained pages, and the same numbers as JSON and CSV; no number is computed here.
+"""Self-contained pages, and the same numbers as JSON and CSV. No number is computed in this package.
 
-Each kind of page is one module, whose ``page`` makes the record that :func:`write` writes.
+Each kind of page has a module, whose function ``page`` makes the record that :func:`write` writes.
 """
 
 from fem_reference.assessment.comparison import Comparison

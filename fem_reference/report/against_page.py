@@ -1,4 +1,4 @@
-"""The page of two versions of one solver: statistics that improved or became worse, and where."""
+"""The page of two versions of a solver: which statistics improved or became worse, and where."""
 
 import math
 from functools import partial
@@ -26,7 +26,7 @@ MOST_CURVES = 8
 def page(versions: Versions, setup: Setup) -> Page:
     """The page of two versions of a solver on a case with this ``setup``."""
     current = versions.current
-    # Pictures of the frame with the greatest change (before, now and the change, on one colour scale), or what software is missing.
+    # Pictures of the frame with the maximum change (before, now and the change, on one colour scale), or the missing software.
     run, found = current.candidate, versions.place
     known = [one for one in versions.changes if one.word != "no number"]  # the greatest changes first
     shown = gallery.figures(setup, run.surface, _shots(versions, found[0])) if found and run.has_surface else ([], "")
@@ -56,7 +56,7 @@ def headline(versions: Versions) -> str:
 
 
 def word(versions: Versions) -> str:
-    """The verdict of the headline: worse if any statistic is worse, else mixed, else better."""
+    """The verdict of the headline: the first of worse, mixed and better that a statistic has, otherwise "as it was"."""
     return next((one for one in ORDER[:3] if versions.count(one)), "as it was")
 
 
@@ -71,7 +71,7 @@ def sentence(one: Change) -> str:
 
 
 def _by(one: Change, k: int) -> str:
-    """The change of a statistic in the k-th frame, as words: nearer to the reference or further from it, and by how much."""
+    """The change of a statistic in the k-th frame in words: its size, and whether it is nearer to the reference or further away."""
     by = float(one.further[k])
     return f"{number(abs(by))} {_unit(one)} {'further' if by > 0 else 'nearer'} in frame {one.numbers[k]}"
 
@@ -82,7 +82,7 @@ def _unit(one: Change) -> str:
 
 
 def place(versions: Versions) -> str:
-    """The vertex that moved most, in words; empty if none moved."""
+    """The vertex that moved most, in words; empty if no vertex moved."""
     if versions.place is None:
         return ""
     i, vertex, distance = versions.place
@@ -125,7 +125,7 @@ def _curve(one: Change, i: int) -> Drawing:
 
 
 def _moved(versions: Versions) -> Drawing | None:
-    """The distance of vertices from their earlier positions; None if none moved."""
+    """A drawing of the distance of vertices from their earlier positions; None if no vertex moved."""
     if versions.place is None:
         return None
 
@@ -140,7 +140,9 @@ def _moved(versions: Versions) -> Drawing | None:
 
 
 def _shots(versions: Versions, i: int) -> list[Shot]:
-    """Shots of the i-th frame: its change, before and now; a shot with a coordinate that is not a number is left out."""
+    """Shots of the i-th frame: the change, the state before and the state now. Shots with coordinates that are not finite are left
+    out.
+    """
     current = versions.current
     points, frame, truth = current.points[i], current.candidate.numbers[i], current.reference.positions[i]
     before = versions.before
@@ -156,7 +158,9 @@ def _shots(versions: Versions, i: int) -> list[Shot]:
 
 
 def _everywhere(versions: Versions, i: int) -> Floats:
-    """The distance (n,) [mm] of each vertex from its earlier position; if unknown, that of the nearest vertex with a value."""
+    """The distance (n,) [mm] of each vertex from its earlier position; a vertex whose distance is unknown has the value of the
+    nearest vertex with a known distance.
+    """
     if versions.before is not None:
         return np.asarray(versions.moved[i])
     rest = versions.current.rest

@@ -1,4 +1,4 @@
-"""Pages requested by a command: their names, built from its options, and the index of all pages in a folder."""
+"""Pages requested by a command: their names, which follow from its options, and the index of all pages in a folder."""
 
 import hashlib
 import logging
@@ -16,13 +16,13 @@ log = logging.getLogger(__name__)
 
 LONGEST = 100  # the maximum number of characters in the name of a page
 INDEX = "index"  # the name of the index page, and its kind
-# Names of other HTML files in subfolders that are listed too.
+# The names of other HTML files in subfolders that the index lists as well.
 _OTHERS = ("report.html", "index.html")
 
 
 @dataclass(frozen=True)
 class Part:
-    """The ``words`` of a command line that determine its result, and the ``name`` that they add to the default name of the page."""
+    """Some ``words`` of a command line that affect its result, and the ``name`` that they add to the default name of the page."""
 
     words: tuple[str, ...]
     name: str = ""
@@ -30,8 +30,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Asked:
-    """A page requested by a command: the ``verb``, the ``base`` of the default name, the ``parts`` of the command line, and
-    ``page``, the name of the file if the page has a folder of its own, else an empty string.
+    """A page requested by a command: the ``verb``, the ``base`` of the default name, and the ``parts`` of the command line. If the
+    page has a folder of its own, ``page`` is the name of its file there; otherwise it is empty.
     """
 
     verb: str
@@ -41,19 +41,19 @@ class Asked:
 
     @property
     def command(self) -> str:
-        """The command line that makes the page, without options that leave its numbers unchanged."""
+        """The command line that makes the page, without options that do not affect its numbers."""
         return shlex.join(["fem-reference", self.verb, *(word for part in self.parts for word in part.words)])
 
     @property
     def name(self) -> str:
-        """The default name."""
+        """The default name of the page."""
         text = "-".join([self.base, *(_plain(part.name) for part in self.parts if part.name)])
         end = f"-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
         return text if len(text) <= LONGEST else text[: LONGEST - len(end)] + end
 
 
 def _plain(text: str) -> str:
-    """A text without characters that a file name cannot have.
+    """The ``text`` without characters that file names cannot contain.
 
     >>> _plain("muscle.tet_size=8 mm"), _plain("effect[0].mu=1 kPa")
     ('muscle.tet_size=8mm', 'effect0.mu=1kPa')
@@ -62,7 +62,9 @@ def _plain(text: str) -> str:
 
 
 def written(asked: Asked, page: Page, folder: Path, name: str | None = None) -> tuple[Path, list[str]]:
-    """Write a page, under ``name`` if given, and the index, but keep other files; return the path of the page, and messages."""
+    """Write a page (under ``name``, if given) and the index, without overwriting other files. Return the path of the page, and
+    messages.
+    """
 
     def where(name: str) -> Path:
         return folder / name / f"{asked.page}.html" if asked.page else folder / f"{name}.html"
@@ -73,7 +75,7 @@ def written(asked: Asked, page: Page, folder: Path, name: str | None = None) -> 
     notes = [note] if note else []
     try:
         write_index(folder)
-    except OSError as error:  # the page, which matters more than the index, has been written
+    except OSError as error:  # the page has been written, which matters more than the index
         notes.append(f"no index: {error}")
     return path, [f"page: {path}", *(f"  {line}" for line in notes)]
 
@@ -89,7 +91,7 @@ class IndexEntry:
 
 
 def write_index(folder: Path) -> None:
-    """Write ``index.html`` of the pages in ``folder``, unless another file of this name exists."""
+    """Write the index of the pages in ``folder``, unless ``index.html`` exists and is not an index of this package."""
     path = folder / f"{INDEX}.html"
     there = pages.read(path)
     if path.exists() and (there is None or there.kind != INDEX):
@@ -99,7 +101,7 @@ def write_index(folder: Path) -> None:
 
 
 def index(entries: list[IndexEntry], others: list[str]) -> Page:
-    """The page of ``entries``, and of the addresses of ``others`` that may be pages."""
+    """The index page of ``entries``, with the addresses of ``others``: files that may be pages."""
     said = (("", "", f"{len(entries)} pages"),)
     return Page(INDEX, "Pages", said, "index_page.html", {"entries": entries, "others": others})
 

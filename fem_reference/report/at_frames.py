@@ -1,4 +1,4 @@
-"""Frames in words: a frame number of the case, with the time and the bones' angles, if these are known."""
+"""Frames in words: a frame number of the case with the time and the motions of the bones, if these are known."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -14,7 +14,7 @@ from fem_reference.scenes.case import Case
 
 @dataclass(frozen=True)
 class Column:
-    """A quantity of a frame: its ``name``, its ``unit``, and its value ``at`` a frame number."""
+    """A quantity that depends on the frame: its ``name``, its ``unit``, and the function ``at`` from frame numbers to values."""
 
     name: str
     unit: str
@@ -22,14 +22,14 @@ class Column:
 
 
 def columns(case: Case, setup: Any) -> list[Column]:
-    """Time [s], if the case has an interval, and the motions of its bones."""
+    """The time [s], if the case has an interval, and the motions of the bones of the set-up."""
     interval = getattr(getattr(case, "frames", None), "interval", None)
     found = [] if interval is None else [Column("time", "s", lambda frame: frame * float(interval))]
     return found + motions(getattr(setup, "bones", ()))
 
 
 def motions(bones: Iterable[Bone]) -> list[Column]:
-    """The angle [°] by which each moving bone is turned, or the distance [mm] by which it is shifted."""
+    """The rotation angle [°] or the translation [mm] of each moving bone."""
     found = list[Column]()
     for bone in bones:
         motion = bone.motion

@@ -1,9 +1,9 @@
-"""A calibration as lines of text: the estimates with their intervals, and parameters that the measurements do not determine."""
+"""A calibration as lines of text: estimates with their intervals, and parameters that the measurements do not determine."""
 
 from fem_reference.assessment.calibration import CONFIDENCE, FOLLOWED, Calibration, Estimate
 from fem_reference.report.words import number
 
-# A scatter below this, in standard deviations of the data, gets a remark.
+# A scatter below this value, in standard deviations of the data, is remarked upon.
 _LITTLE = 0.5
 
 

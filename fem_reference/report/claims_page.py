@@ -1,4 +1,4 @@
-"""The page ``error-bars``: error bars of references against their differences from finer solutions."""
+"""The page ``error-bars``: error bars of references compared with differences from finer solutions."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -40,7 +40,7 @@ def page(claims: Claims) -> Page:
 
 
 def widest(claims: Claims, case: str, metric: str, statistic: str) -> Claim:
-    """The claim about a deviation with the widest bar."""
+    """The claim with the widest bar about the deviation in a statistic of a case."""
     found = [one for one in claims.claims if (one.case, one.metric, one.statistic) == (case, metric, statistic)]
     return max((one for one in found if one.of == "deviation"), key=lambda one: one.bar)
 
@@ -53,7 +53,7 @@ def facts(claims: Claims) -> dict[str, Any]:
 
 
 def drawing(claims: Sequence[Claim], metric: str, name: str) -> Drawing:
-    """Bars against errors, with a colour for each case; ``name`` makes the ids in the drawing unique."""
+    """A drawing of error bars against true errors, with a colour for each case. ``name`` makes the ids in the drawing unique."""
     title = f"{words(metric).capitalize()}: claimed against true"
 
     def draw(_: Figure, axes: Axes) -> None:

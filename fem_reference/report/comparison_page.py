@@ -28,7 +28,7 @@ from fem_reference.runs.store import Run, seconds_per_frame
 
 
 def page(comparison: Comparison) -> Page:
-    """The page of a comparison; if the reference failed, over the frames that it reached."""
+    """The page of a comparison. If the reference failed, the page covers the frames that the reference reached."""
     numbers, failed = summary(comparison), _failed(comparison)
     nothing, comparison = not len(reached_frames(comparison.reference)), reached(comparison)
     said, rows = headlines(comparison), as_csv(numbers["measures"])
@@ -38,7 +38,7 @@ def page(comparison: Comparison) -> Page:
 
 
 def _failed(comparison: Comparison) -> str:
-    """The reason why the reference did not reach all frames, and the resulting scope of the page; empty if it reached all."""
+    """The reason why the reference failed, and the resulting scope of the page; empty if the reference converged."""
     reference, wanted = comparison.reference, len(comparison.reference.numbers)
     if reference.outcome.status == "converged":
         return ""
@@ -85,8 +85,8 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
 
 
 def widest(bar: ErrorBar, measure: Measure | None) -> int:
-    """The index of the frame with the widest ``bar`` among those in which the reference's ``measure`` has a value (a moment arm
-    has none without a force); an unknown bar in one of these frames counts as the widest.
+    """The index of the frame with the widest ``bar``. Only frames in which the ``measure`` of the reference has a value count (a
+    moment arm has no value without a force); an unknown bar in one of these frames counts as the widest.
     """
     if measure is None or not np.isfinite(measure.values).any():
         return bar.widest
@@ -94,13 +94,15 @@ def widest(bar: ErrorBar, measure: Measure | None) -> int:
 
 
 def gap(run: Run) -> float:
-    """The energy gap that is farthest from 0 [%], NaN if there is none."""
+    """The energy gap [%] with the largest magnitude; NaN if there is none."""
     values = run.scalars["energy_gap"]
     return 100 * float(values[np.nanargmax(np.abs(values))]) if np.isfinite(values).any() else math.nan
 
 
 def headlines(comparison: Comparison) -> Headlines:
-    """The verdict on each candidate with its greatest deviations; then the checks of the reference, and doubts about it."""
+    """The verdict on each candidate with its maximum deviations, followed by the verdict on the reference with its expectations and
+    doubts.
+    """
     found = list[tuple[str, str, str]]()
     for run in comparison.candidates:
         ended = "" if run.outcome.status == "converged" else f"{run.outcome.status}; "
@@ -116,7 +118,7 @@ def _checks(comparison: Comparison) -> str:
 
 
 class VerdictRow(NamedTuple):
-    """A row of the top table: a ``run``, its verdict, its headline measures (None if missing), and remarks."""
+    """A row of the top table: a ``run``, its verdict (``word``), its headline ``measures`` (None if missing), and ``remarks``."""
 
     run: Run
     word: str
@@ -125,7 +127,7 @@ class VerdictRow(NamedTuple):
 
 
 def first_rows(comparison: Comparison) -> list[VerdictRow]:
-    """The rows of the top table; the reference is last, with the doubts about it."""
+    """The rows of the top table. The last row is that of the reference, with the doubts about the reference."""
     rows = list[VerdictRow]()
     for run in comparison.candidates:
         found = comparison.deviations.get(run.name, ())
@@ -140,19 +142,19 @@ def first_rows(comparison: Comparison) -> list[VerdictRow]:
 
 
 def _headline_keys(comparison: Comparison) -> list[tuple[str, str]]:
-    """The metric and statistic of each column of the top table: all that some candidate has."""
+    """The metric and statistic of each column of the top table: those headline statistics that at least one candidate has."""
     every = [one for run in comparison.candidates for one in comparison.deviations.get(run.name, ())]
     return [key for key in described("headline") if find(every, *key) is not None]
 
 
 def first_columns(comparison: Comparison) -> list[str]:
-    """The headings of the top table's columns of numbers."""
+    """The headings of the columns of numbers in the top table."""
     named = described("headline")
     return [f"{named[key].title}, {named[key].part}".strip(", ") for key in _headline_keys(comparison)]
 
 
 def _greatest(comparison: Comparison, run: Run) -> str:
-    """The greatest deviations of a candidate, with the error bars of the reference."""
+    """The maximum deviations of a candidate with the error bars of the reference, in words."""
     said = []
     for (metric, statistic), described_as in described("headline").items():
         one = find(comparison.deviations.get(run.name, ()), metric, statistic)
@@ -169,7 +171,7 @@ def _greatest(comparison: Comparison, run: Run) -> str:
 
 
 def _sentence(comparison: Comparison) -> str:
-    """The comparison in a sentence: the candidates, the frames, and the number of expectations that are met."""
+    """A sentence on the comparison: the candidates, the frames, and the number of expectations that are met."""
     numbers, names = comparison.reference.numbers, [run.name for run in comparison.candidates]
     compared = f"{listed(names)} compared with the reference" if names else "The reference"
     words = [verdict.word for verdict in comparison.verdicts]

@@ -45,7 +45,7 @@ def page(found: Credibility) -> Page:
 
 
 def by_grade(found: Credibility) -> list[tuple[str, list[str], str]]:
-    """Each grade that occurs, with its quantities and its meaning; the first grade, validated, even without quantities."""
+    """Each grade that occurs, with its quantities and its meaning. The grade "validated" is listed even without quantities."""
     names = {grade: [row.claim.name for row in found.rows if row.grade == grade] for grade in GRADES}
     return [(grade, names[grade], meaning) for grade, meaning in GRADES.items() if names[grade] or grade == "validated"]
 
@@ -61,13 +61,15 @@ def said(found: Credibility) -> str:
 
 
 def met(values: Mapping[str, float], one: Beside) -> bool | None:
-    """True if the value for a comparison is within its uncertainty; None without a value."""
+    """True if the value for a comparison is within the uncertainty of the comparison; None without a value."""
     return abs(values[one.name] - one.truth) <= one.within if one.name in values else None
 
 
 def differences(row: Row, arms: Iterable[ArmsBeside]) -> str:
-    """The numbers of values of the model that are too large and too small, and their differences from measurements: in units of
-    the uncertainty, or for moment arms the means over the poses of each case [mm]. Wrong rankings are counted separately.
+    """The number of values of the model that are too large and too small, and their differences from measurements, in words.
+
+    Differences are in units of the uncertainty; for moment arms they are means over the poses of each case [mm]. Wrong rankings are
+    counted separately.
     """
     own = [one for one in row.beside if one.kind == "measurement"]
     orders, numbers = ([one for one in own if one.is_order is kind] for kind in (True, False))
@@ -92,13 +94,13 @@ def _span(values: list[float]) -> str:
 
 
 def specimens(row: Row) -> str:
-    """The number of specimens of each source of measurements."""
+    """The number of specimens in each source of measurements."""
     known = {one.experiment: one.n for one in row.beside if one.kind == "measurement"}
     return ", ".join(f"{source(name)}: {n or 'not known'}" for name, n in known.items())
 
 
 def source(experiment: str) -> str:
-    """An experiment's author and year.
+    """The author and the year of an experiment.
 
     >>> source("van_loocke_2006")
     'Van Loocke 2006'
@@ -144,7 +146,7 @@ def facts(found: Credibility) -> dict[str, Any]:
 
 
 def _drawing(arms: ArmsBeside) -> Drawing:
-    """The range of the fibres' moment arms over the angle, with the published curve or range."""
+    """A drawing of the range of the fibres' moment arms over the angle, with the published curve or range."""
 
     def draw(_: Figure, axes: Axes) -> None:
         at, own, known = arms.found.angles, arms.found, arms.published

@@ -1,4 +1,4 @@
-"""Curves over frames, and over the angles of joints, for the page of a comparison."""
+"""Curves over frames and over the angles of joints, for the page of a comparison."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,7 +17,7 @@ from fem_reference.report.tables import inversion
 from fem_reference.report.words import words
 
 _KNOWN = "error bar"
-_FAR = 50.0  # ratio of two candidates' maximum distances beyond which the common axis is logarithmic
+_FAR = 50.0  # the ratio of the maximum distances of two candidates beyond which the common axis is logarithmic
 _RANGE = "minimum and maximum over the fibres"
 _STATISTICS = (
     ("max", "worst vertex", "-"),
@@ -28,7 +28,7 @@ _STATISTICS = (
 
 
 def curves(comparison: Comparison) -> list[Drawing]:
-    """Every drawing for which the comparison has numbers."""
+    """All drawings for which the comparison has values."""
     found = [_surface(comparison, i) for i in range(len(comparison.candidates))]
     found += [_of_runs(comparison, key, one.curve) for key, one in described("curve").items()]
     context = comparison.context
@@ -38,13 +38,15 @@ def curves(comparison: Comparison) -> list[Drawing]:
 
 
 def label_of(inverted: Measure) -> str:
-    """The words that distinguish the inversion measures: the kind of points at which det F is taken."""
+    """The words that distinguish measures of inversion: the kind of points at which det F is evaluated."""
     return words(inverted.statistic.removeprefix("min_det_F").lstrip("_"))
 
 
 def _of_runs(comparison: Comparison, key: tuple[str, str], title: str, i: int | None = None) -> Drawing | None:
-    """The change of a measure from rest for every run, with the error bar of the reference; over frames, or over the angle of joint
-    ``i`` in the frames in which only this joint rotates. None if no run has the measure.
+    """A drawing of the change of a measure from rest for every run, with the error bar of the reference. None if no run has the
+    measure.
+
+    The change is drawn over frames or, with a joint ``i``, over the angle of this joint in frames in which only this joint rotates.
     """
     context, numbers = comparison.context, comparison.reference.numbers
     measures = {run.name: find(comparison.changes[run.name], *key) for run in comparison.runs}
@@ -63,7 +65,9 @@ def _of_runs(comparison: Comparison, key: tuple[str, str], title: str, i: int | 
 def _draw_runs(
     comparison: Comparison, found: dict[str, Measure], along: Floats, shown: NDArray[np.bool_], axes: Axes
 ) -> None:
-    """Draw the measures ``found``, by run, over ``along`` (f,), at the frames ``shown`` (f,), and the range of reference fibres."""
+    """Draw the measures ``found`` of the runs over ``along`` (f,) at the frames ``shown`` (f,), and the range over fibres of the
+    reference.
+    """
     look_by_name = looks(run.name for run in comparison.runs)
     for i, run in enumerate(comparison.runs):
         if run.name not in found:
@@ -80,7 +84,9 @@ def _draw_runs(
 
 
 def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:
-    """The ends [mm] of the common axis of all surface curves; True if candidates differ so much that the axis is logarithmic."""
+    """The lower and upper end [mm] of the common axis of all surface curves, and True if candidates differ so much that the axis is
+    logarithmic.
+    """
     wanted = [("surface_deviation", statistic) for statistic, _, _ in _STATISTICS]
     tops = []
     for measures in comparison.deviations.values():
@@ -93,7 +99,7 @@ def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:
 
 
 def _surface(comparison: Comparison, i: int) -> Drawing | None:
-    """The distances of a candidate's surface from the reference, over the error bars of the reference."""
+    """A drawing of the distances of a candidate's surface from the reference, with the error bars of the reference."""
     run = comparison.candidates[i]
     low, high, far = surface_limits(comparison)
     measures, colour = comparison.deviations[run.name], looks(one.name for one in comparison.runs)[run.name]["color"]
@@ -135,7 +141,7 @@ def _band(axes: Axes, along: Sequence[float] | Floats, middle: Floats, bar: Floa
 
 
 def _line(axes: Axes, numbers: Sequence[float] | Floats, measure: Measure, label: str, **look: str | float) -> None:
-    """Draw a measure over frames, with a cross on the axis at each frame whose value is not finite."""
+    """Draw a measure over frames ``numbers``, with a cross on the axis at each frame whose value is not finite."""
     frames, values = np.asarray(numbers), np.asarray(measure.values, float)
     bad = ~np.isfinite(values)
     axes.plot(frames, np.where(bad, np.nan, values), label=label, **look)  # type: ignore[arg-type]

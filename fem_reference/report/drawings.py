@@ -1,4 +1,4 @@
-"""Drawings inside a page: SVG whose text stays text and whose ids are unique."""
+"""Drawings inside a page, as SVG with searchable text and unique ids."""
 
 import io
 import re
@@ -21,7 +21,7 @@ from fem_reference.report.words import number
 
 REFERENCE = "#222222"
 # First the palette of Okabe and Ito for all kinds of colour vision, without black and yellow; then the muted colours of Tol that
-# differ from it; then colours in between. style.css has variants of all for dark pages.
+# differ from this palette; then colours in between. style.css has variants of all colours for dark pages.
 PALETTE = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255"),
     *("#999933", "#332288", "#777777", "#7a4a1e", "#951afe", "#1e5b09", "#d81b8c", "#1fb80d"),
@@ -41,12 +41,12 @@ _OURS = (
     ),
     *("xpbd", "arap", "pbd_program", "arap_volume_step", "line_of_action"),
 )
-# The number of lines that differ by colour alone; further lines are dashed.
+# The number of lines that are distinguished by colour alone; further lines are dashed.
 _BY_COLOUR, _DASHES = 6, ("-", "--", ":", "-.")
 NOT_A_NUMBER = "not a number"
 BAND = "#01010120"  # nearly black, as matplotlib omits pure black from SVG
 LOOK: Any = dict(mpl.rc_params_from_file(Path(__file__).with_suffix(".mplstyle"), use_default_template=False))
-# Names in style.css of colours that change on dark pages.
+# The names in style.css of those colours that change on dark pages.
 _NAMED = {
     "#e8e8e8": "grid",
     "#888888": "axis",
@@ -72,7 +72,7 @@ class Drawing:
 
 
 def colour_of(i: int) -> str:
-    """The i-th colour: 0 is the colour of the reference; the palette and ever darker shades of it follow.
+    """The i-th colour: first the colour of the reference (0), then the palette, then darker and darker shades of the palette.
 
     >>> colour_of(0), colour_of(1), colour_of(16)
     ('#222222', '#0072b2', '#004c77')
@@ -85,7 +85,7 @@ def colour_of(i: int) -> str:
 
 
 def look_of(i: int) -> dict[str, Any]:
-    """The colour and the dashes of the i-th line; line 0 is the reference.
+    """The colour and the line style of the i-th line; line 0 is the reference.
 
     >>> look_of(1), look_of(7)
     ({'color': '#0072b2', 'linestyle': '-'}, {'color': '#882255', 'linestyle': '--'})
@@ -94,8 +94,8 @@ def look_of(i: int) -> dict[str, Any]:
 
 
 def looks(names: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Colour and dashes by the name of a run or solver: fixed for our solvers on all pages, the next free colour and dashes for
-    others.
+    """Colour and line style by name of the run or solver. Our solvers look the same on all pages; other solvers have the next free
+    colours and line styles.
 
     >>> looks(["reference", "mine", "pbd"])["pbd"] == looks(["fenicsx", "pbd"])["pbd"] == look_of(1)
     True
@@ -108,7 +108,7 @@ def looks(names: Iterable[str]) -> dict[str, dict[str, Any]]:
 
 
 def drawn(name: str, title: str, size: tuple[float, float], draw: Callable[[Figure, Axes], None]) -> Drawing:
-    """A drawing of ``size`` [in] made by ``draw``, as SVG whose ids begin with ``name``."""
+    """Make a drawing of ``size`` [in] by calling ``draw``. The ids in its SVG begin with ``name``."""
     with mpl.rc_context(LOOK):
         figure = Figure(figsize=size, layout="constrained")
         FigureCanvasSVG(figure)
@@ -119,7 +119,7 @@ def drawn(name: str, title: str, size: tuple[float, float], draw: Callable[[Figu
 
 
 def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], over: str = "frame") -> Drawing:
-    """A drawing of curves over frame numbers, or over the quantity that ``over`` names, with a legend above."""
+    """Make a drawing of curves over frame numbers, or over the quantity that ``over`` names, with a legend above the curves."""
 
     def whole(figure: Figure, axes: Axes) -> None:
         draw(axes)
@@ -133,7 +133,9 @@ def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], 
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
-    """Add a legend above in as many columns as fit, with the entry for NaN last; with more than three rows the figure grows."""
+    """Add a legend above the axes in as many columns as fit, with the entry for NaN last. For more than three rows the figure is
+    made taller.
+    """
     entries = sorted(zip(*axes.get_legend_handles_labels(), strict=True), key=lambda entry: entry[1] == NOT_A_NUMBER)
     handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
     lengths = [len(label) + 7 for label in labels]
@@ -143,14 +145,14 @@ def _legend(figure: Figure, axes: Axes) -> None:
 
 
 def logarithmic(axes: Axes) -> None:
-    """Make both axes logarithmic, with plain numbers instead of formulas."""
+    """Make both axes logarithmic, with plain numbers instead of powers as labels."""
     axes.set(xscale="log", yscale="log")
     plain_numbers(axes.xaxis)
     plain_numbers(axes.yaxis)
 
 
 def positive(sizes: Floats, errors: Floats) -> tuple[Floats, Floats]:
-    """The ``sizes`` and ``errors`` (n,) whose error can be drawn on a logarithmic axis."""
+    """Those ``sizes`` and ``errors`` (n,) whose error can be drawn on a logarithmic axis."""
     kept = np.isfinite(errors) & (errors > 0)
     return sizes[kept], errors[kept]
 
@@ -170,7 +172,7 @@ def plain_numbers(axis: Any) -> None:
 
 
 def inline(svg: str, name: str, title: str) -> str:
-    """The ``<svg>`` element alone, as wide as its container; ids begin with ``name``, and the page may set named colours."""
+    """The ``<svg>`` element alone, as wide as its container. Its ids begin with ``name``, and the page may change named colours."""
     name = re.sub(r"[^\w.-]", "_", name)
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg).replace("xlink:href", "href")
@@ -183,7 +185,7 @@ def inline(svg: str, name: str, title: str) -> str:
 
 
 def _named(colour: str) -> str:
-    """A colour as a CSS variable that a page may set, with the colour itself as default.
+    """A colour as a CSS variable that a page may set; the default is the colour itself.
 
     >>> _named("#e8e8e8"), _named("#d55e00")
     ('var(--grid, #e8e8e8)', 'var(--c-d55e00, #d55e00)')

@@ -1,4 +1,4 @@
-"""The page of omissions: the change and the cost of each effect of a scene and each feature of a candidate."""
+"""The page of omissions: the change of results and the cost due to each effect of a scene or each feature of a candidate."""
 
 import math
 from typing import Any
@@ -19,7 +19,7 @@ MAIN = "surface_deviation.rms"
 HEADS = {
     ".".join(key): f"{one.title} ({one.part})".removesuffix(" ()").lower() for key, one in described("main").items()
 }
-# The axis ends below the least change that counts, by this factor; smaller changes are drawn at its end, with their values.
+# The axis ends at the smallest change that counts divided by this factor; smaller changes are drawn at its end, with their values.
 _DEPTH = 10.0
 
 
@@ -43,7 +43,7 @@ def page(found: CaseOmissions) -> Page:
 
 
 def label(ablation: Ablation, omission: Omission) -> str:
-    """The effects or features left out, in words: "all of them" if nothing else could be left out."""
+    """The effects or features that are left out, in words; "all of them" if these are all that can be left out."""
     if not omission.left_out:
         return "nothing"
     every = {name for one in ablation.omissions for name in one.left_out}
@@ -62,13 +62,13 @@ def percent(share: float) -> str:
 
 
 def phases(found: CaseOmissions) -> list[str]:
-    """The phases in which some run of the case spent time."""
+    """The phases in which at least one run of the case spent time."""
     runs = [one for ablation in found.ablations for one in (ablation.whole, *ablation.omissions)]
     return [name for name in omissions.PHASES if any(one.phase(name) > 0 for one in runs)]
 
 
 def sentences(found: CaseOmissions, ablation: Ablation) -> list[str]:
-    """The changes due to leaving out effects or features of a run, in sentences."""
+    """Sentences on the changes due to the omission of effects or features of a run."""
     whole = ablation.whole
     if whole.status != "converged":
         return [f"Nothing was left out, because the complete run did not converge ({whole.status}): {whole.message}"]
@@ -93,7 +93,7 @@ def _sentence(found: CaseOmissions, ablation: Ablation, one: Omission) -> str:
 
 
 def _most(found: CaseOmissions, one: Omission) -> str:
-    """The change that is largest relative to its error bar, in words."""
+    """The change that is largest relative to the error bar of its statistic, in words."""
     in_bars = omissions.in_bars(one.changes, found.bars).items()
     ratios = {name: ratio for name, ratio in in_bars if not math.isnan(ratio)}
     name = max(ratios, key=lambda name: ratios[name]) if ratios else next(iter(one.changes))
@@ -102,7 +102,7 @@ def _most(found: CaseOmissions, one: Omission) -> str:
 
 
 def drawing(found: CaseOmissions) -> Drawing | None:
-    """The change due to an omission against the time that it saves; None if there is nothing to draw."""
+    """A drawing of the change due to each omission against the time saved; None if there is nothing to draw."""
     points = {
         ablation.name: [
             (label(ablation, one), 100 * (1 - share), one.changes[MAIN])
@@ -135,7 +135,7 @@ def drawing(found: CaseOmissions) -> Drawing | None:
 
 
 def _draw(axes: Axes, rows: list[tuple[str, float, float]], floor: float, colour: str, name: str) -> None:
-    """Draw the points of a run at ``floor`` [mm] or above: a smaller change is written next to its point."""
+    """Draw the points of a run. A change below ``floor`` [mm] is drawn at ``floor``, and its value is written next to the point."""
     if rows:
         heights = [max(change, floor) for _, _, change in rows]
         axes.plot([saved for _, saved, _ in rows], heights, "o", color=colour, markersize=5, label=name)

@@ -16,7 +16,7 @@ from fem_reference.metrics import described
 from fem_reference.report.drawings import Drawing, colour_of, drawn, logarithmic, look_of
 from fem_reference.report.pages import Page
 
-# Distances between two Gaussians, in radii: from 2 sqrt(log 2) = 1.665 on, the surface has two parts.
+# Distances between two Gaussians, in radii. Beyond 2 sqrt(log 2) = 1.665 the surface has two parts.
 _APART = (1.2, 1.6, 1.65, 1.7)
 # Control points in the plane, as in the report's Figure 3.1.
 _POINTS = np.array([[0.0, 0.0], [1.0, 1.6], [2.2, 1.4], [3.0, -0.4], [4.4, 0.6]])
@@ -40,7 +40,7 @@ def page(found: Estimation) -> Page:
 
 
 def said(found: Estimation) -> str:
-    """The best technique for fibres and the accuracy of Gaussians, in sentences, if they were measured."""
+    """Sentences on the best technique for fibres and on the accuracy of Gaussians, if they were measured."""
     sentences = list[str]()
     if found.curves:  # empty if no fibre has enough points
         errors = {name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES}
@@ -51,7 +51,7 @@ def said(found: Estimation) -> str:
         sentences.append(
             f"{most} Gaussians deviate from a muscle's surface by "
             f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms, with "
-            f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer numbers"
+            f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer parameters"
         )
     return "; ".join(sentences) or "nothing was measured"
 
@@ -71,7 +71,7 @@ def _rows[Error](errors: Iterable[Error], *names: str) -> dict[tuple[object, ...
 
 
 def _figure() -> Drawing:
-    """The report's Figure 3.1: all techniques through the same points."""
+    """A drawing of the report's Figure 3.1: the curves of all techniques through the same points."""
 
     def draw(_: Figure, axes: Axes) -> None:
         for i, (name, (make, _smooth)) in enumerate(TECHNIQUES.items()):
@@ -85,7 +85,7 @@ def _figure() -> Drawing:
 
 
 def _curves(found: Estimation) -> Drawing:
-    """Errors against the number of known points, over all cases."""
+    """A drawing of the mean error of each technique over all cases against the number of known points."""
 
     def draw(_: Figure, axes: Axes) -> None:
         counts = sorted({one.known for one in found.curves})
@@ -103,7 +103,9 @@ def _curves(found: Estimation) -> Drawing:
 
 
 def two_blobs(apart: float, size: int = 161) -> tuple[Floats, Floats, Floats]:
-    """Coordinates along (n,) and across (m,) in a plane, and the level (m, n) of two Gaussians of radius 1, positive inside."""
+    """The level of two Gaussians of radius 1 in a plane: coordinates (n,) along the line through their centres, coordinates (m,)
+    across this line, and levels (m, n), which are positive inside.
+    """
     along, across = np.linspace(-1.4, 1.4, size), np.linspace(-1, 0.8, size)
     x, y = np.meshgrid(along, across)
     surface = GaussianSurface(np.array([[-apart / 2, 0, 0], [apart / 2, 0, 0]]), np.ones(2))
@@ -112,7 +114,7 @@ def two_blobs(apart: float, size: int = 161) -> tuple[Floats, Floats, Floats]:
 
 
 def _blobs() -> Drawing:
-    """The report's Figure 7.1: two Gaussians that merge."""
+    """A drawing of the report's Figure 7.1: two Gaussians that merge."""
 
     def draw(_: Figure, axes: Axes) -> None:
         for i, apart in enumerate(_APART):
@@ -126,7 +128,7 @@ def _blobs() -> Drawing:
 
 
 def _fits(found: Estimation) -> Drawing:
-    """Errors of implicit surfaces against the number of Gaussians, for each case."""
+    """A drawing of the error of implicit surfaces against the number of Gaussians, for each case."""
 
     def draw(_: Figure, axes: Axes) -> None:
         for i, case in enumerate(dict.fromkeys(one.case for one in found.fits)):

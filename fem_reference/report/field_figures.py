@@ -1,4 +1,4 @@
-"""Drawings of a scalar example inside a page: curves as SVG, maps and views as WebP."""
+"""Drawings of a scalar example inside a page: curves in SVG, maps and views in WebP."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -26,25 +26,25 @@ from fem_reference.runs.store import Run
 
 VALUES, DIFFERENCES = "viridis", "RdBu_r"
 _DPI = 150
-_LIGHT = np.array([0.3, 0.45, 0.84])  # the direction towards the light, above and to the right of the eye
+_LIGHT = np.array([0.3, 0.45, 0.84])  # the direction towards the light, above and to the right of the viewer
 _LISTING: Any = {"color": "blue", "linewidth": 2, "marker": "o", "markersize": 6, "markerfacecolor": "lime"}
 _MARKERS = "xd+s^v"
 
 
 def rival(example: Comparison) -> Run | None:
-    """The run to be compared with the reference: the listing, else the first candidate."""
+    """The run that is compared with the reference: the listing or, without one, the first candidate."""
     listings = [run for run in example.candidates if run.solver == "listing"]
     return next(iter([*listings, *example.candidates]), None)
 
 
 def drawings(example: Comparison) -> list[Drawing]:
-    """Drawings of the solutions of an example: lines over an interval, maps and views of triangles."""
+    """Drawings of the solutions of an example: lines on an interval, otherwise maps and views of triangles."""
     dimension = example.setup.mesh.points.shape[1]
     return _lines(example) if dimension == 1 else list(_panels(example, _plate if dimension == 2 else _body))
 
 
 def convergence(example: Comparison) -> Drawing:
-    """Error against the number of cells, with a line for each element."""
+    """A drawing of the error against the number of cells, with a line for each element."""
     title = "Error as the mesh is refined"
     lines = [(one.element, *positive(np.array(one.cells, float), np.array(one.errors))) for one in example.ladders]
     if not any(len(cells) for _, cells, _ in lines):
@@ -81,7 +81,9 @@ def _lines(example: Comparison) -> list[Drawing]:
 
 
 def _distances(example: Comparison, known: list[Run]) -> Drawing:
-    """The difference of every run from the exact solution at the nodes, or of the candidates from the reference."""
+    """A drawing of the difference at the nodes between every run and the exact solution or, without one, between candidates and the
+    reference.
+    """
     exact, runs, base = example.setup.exact, known, example.reference.vertex_values[-1]
     if exact is not None:
         base, title = at(exact, example.setup.mesh.points), "Difference from the exact solution at nodes"
@@ -107,7 +109,7 @@ def _sorted(run: Run, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _look(i: int, run: Run) -> dict[str, Any]:
-    """The style of a line: for the listing the style of its ``plot`` command, otherwise a style by the index of the run."""
+    """The style of a line. The listing has the style of its ``plot`` command; the style of other runs depends on their index."""
     if run.solver == "listing":
         return dict(_LISTING)
     marker = _MARKERS[i % len(_MARKERS)]
@@ -124,8 +126,8 @@ def _svg(name: str, title: str, draw: Callable[[Axes], None]) -> Drawing:
 
 
 def _panels(example: Comparison, draw: Callable[..., None]) -> Iterator[Drawing]:
-    """The rival, the reference and their difference. ``draw`` gets the values (n,) at the vertices, all values (k, n) that share
-    their colour scale, and the name of the colour map.
+    """Drawings of the rival, the reference and their difference. The arguments of ``draw`` are the values (n,) at the vertices, all
+    values (k, n) that share the colour scale, and the name of the colour map.
     """
     reference, other = example.reference, rival(example)
     solutions = [run.vertex_values[-1] for run in (reference, other) if run is not None]
@@ -159,7 +161,7 @@ def _webp(title: str, draw: Callable[[Figure], None]) -> Drawing:
 
 
 def _plate(figure: Figure, example: Comparison, values: Floats, scale_of: Floats, colours: str) -> None:
-    """Draw a map with the triangles, and the values as heights above the plate."""
+    """Draw a map with the triangles of the mesh, and a view with the values as heights above the plate."""
     mesh, scale = example.setup.mesh, _scale(scale_of, colours)
     x, y = mesh.points.T
     axes: Any = figure.add_subplot(1, 2, 1)
@@ -178,7 +180,7 @@ def _plate(figure: Figure, example: Comparison, values: Floats, scale_of: Floats
 
 
 def _scale(values: Floats, colours: str) -> Normalize:
-    """The colour scale from the minimum to the maximum; for differences, symmetric about zero."""
+    """The colour scale, from the minimum to the maximum; for differences it is symmetric about zero."""
     low, high = float(values.min()), float(values.max())
     if colours == DIFFERENCES:
         high = max(-low, high)
@@ -188,7 +190,7 @@ def _scale(values: Floats, colours: str) -> Normalize:
 
 @dataclass(frozen=True)
 class _Window:
-    """A part of a surface: ``low`` and ``high`` corners (3,), and the width of the ``line`` around its triangles."""
+    """A part of a surface: its ``low`` and ``high`` corners (3,), and the width of the ``line`` around triangles."""
 
     title: str
     low: Floats
@@ -197,14 +199,14 @@ class _Window:
 
     @property
     def half(self) -> tuple[float, float]:
-        """Half the window's width and height: a square, narrower if the part is higher than wide."""
+        """Half the width and half the height of the window, which is a square, or narrower if the part is higher than wide."""
         width, height = (float(length) for length in 0.53 * (self.high - self.low)[:2])
         height = max(width, height)
         return max(width, height / 2), height
 
 
 def _windows(points: Floats, anchors: Floats) -> list[_Window]:
-    """The windows: the entire surface, the belt around its mean height, and the part around its anchors (k, 3)."""
+    """The windows: the entire surface, the belt around the mean height of ``points``, and the part around ``anchors`` (k, 3)."""
     height, extent = float(np.ptp(points[:, 1])), float(np.ptp(points, axis=0).max())
     windows = [_Window("whole", points.min(axis=0), points.max(axis=0), 0.0)]
     belt = points[np.abs(points[:, 1] - points[:, 1].mean()) < 0.1 * height]
@@ -218,7 +220,7 @@ def _windows(points: Floats, anchors: Floats) -> list[_Window]:
 
 
 def _body(figure: Figure, example: Comparison, values: Floats, scale_of: Floats, colours: str) -> None:
-    """Draw a surface in space, seen along z from the side of its anchors with y up. Each window has its own colour scale."""
+    """Draw a surface in space with y up, as seen along z from the side of its anchors. Each window has its own colour scale."""
     mesh = example.setup.mesh
     anchors = mesh.points[~np.isnan(example.setup.fixed[: len(mesh.points)])]
     behind = len(anchors) > 0 and anchors[:, 2].mean() < mesh.points[:, 2].mean()
@@ -240,14 +242,14 @@ def _body(figure: Figure, example: Comparison, values: Floats, scale_of: Floats,
 
 
 def _front(mesh: FieldMesh, values: Floats, scale: ScalarMappable, line: float) -> PolyCollection:
-    """The triangles as seen along z, the furthest first; triangles turned away from the light are darker."""
+    """The triangles as seen along z, from the farthest to the nearest. Triangles that face away from the light are darker."""
     corners = mesh.points[mesh.cells]
     across = normals(corners)
     light = np.abs(across @ _LIGHT) / np.linalg.norm(across, axis=1)
     faces = np.asarray(scale.to_rgba(values[mesh.cells].mean(axis=1)))
     faces[:, :3] *= (0.55 + 0.45 * light)[:, None]
     order = np.argsort(corners[:, :, 2].mean(axis=1))
-    # Triangles get edges in their own colour; without them the white background shows between triangles.
+    # Triangles have edges in their own colour; otherwise the white background would be visible between them.
     edges: Any = (0, 0, 0, 0.5) if line else faces[order]
     shown = list(corners[order, :, :2])
     return PolyCollection(shown, facecolors=faces[order], edgecolors=edges, linewidths=line or 0.2)

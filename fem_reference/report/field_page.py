@@ -18,7 +18,7 @@ AGREE = 1e-9  # a difference below this fraction of the maximum is rounding
 
 
 def page(title: str, examples: tuple[Comparison, ...]) -> Page:
-    """The page of scalar examples with the table of differences between the report's text and listings."""
+    """The page of several scalar examples, with the table of differences between the text and the listings of the report."""
     words = [one.word for one in examples]
     said = (("", overall(words), f"{words.count('pass')} of {len(words)} pass"),)
     contents = _contents(examples) | {"differences": _section()["difference"]}
@@ -44,15 +44,16 @@ def _contents(examples: tuple[Comparison, ...]) -> dict[str, Any]:
 
 
 def _section() -> dict[str, list[dict[str, str]]]:
-    """The tables of the file about section 4.6 of the report: each ``difference`` between a ``text`` and its ``listing``, by
-    ``section``, with its ``measured`` effect; and the ``caption`` of each ``figure`` of a ``case`` (pictures of the report are not
-    distributed).
+    """The tables of the file about section 4.6 of the report.
+
+    Each ``difference`` has the ``section``, the ``text``, the ``listing`` and the ``measured`` effect. Each ``figure`` has its
+    ``case`` and its ``caption``; the pictures of the report are not distributed.
     """
     return tomllib.loads(Path(__file__).with_name("octave_section.toml").read_text(encoding="utf-8"))
 
 
 def apart(example: Comparison) -> str:
-    """The difference at the vertices between the listing (else the first candidate) and the equation, in one sentence."""
+    """A sentence on the difference at the vertices between the listing (without one, the first candidate) and the equation."""
     other, reference = field_figures.rival(example), example.reference
     if other is None:
         return "there is only a reference, and no candidate."
@@ -77,31 +78,31 @@ def apart(example: Comparison) -> str:
 
 
 def bounds(run: Run) -> tuple[float, float] | tuple[None, None]:
-    """The minimum and the maximum over the vertices, NaN if any value is not a number; None if, in addition, the run failed."""
+    """The minimum and the maximum over the vertices: NaN if a value is NaN, and None if, in addition, the run failed."""
     if _lost(run):
         return None, None
     return float(run.vertex_values[-1].min()), float(run.vertex_values[-1].max())
 
 
 def _lost(run: Run) -> bool:
-    """True for a run that failed and has a value that is not a number."""
+    """True for a run that failed and has a value that is not finite."""
     return run.outcome.status != "converged" and not np.isfinite(run.vertex_values[-1]).all()
 
 
 def seconds(run: Run) -> float | None:
-    """The time [s] that a run took, None if it is not stated."""
+    """The time [s] that a run took; None if the run does not state it."""
     cost = run.outcome.cost
     parts = [value for key, value in cost.items() if key.startswith("seconds_")]
     return sum(parts) if parts else cost.get("seconds")
 
 
 def form(example: Comparison, run: Run) -> str:
-    """The weak form that was solved: the form of the run, else of the problem."""
+    """The weak form that was solved: the form that the run states or, without one, the form of the problem."""
     return str(run.origin.get("form", example.setup.form))
 
 
 def pivot(example: Comparison) -> dict[str, list[float | None]]:
-    """The values of every run by metric, None if a run has none; empty if the reference failed."""
+    """The values of all runs by metric, with None for a run without a value; empty if the reference failed."""
     if _lost(example.reference):
         return {}
     measured = {"reference": example.changes["reference"]} | example.deviations

@@ -1,4 +1,4 @@
-"""Pictures of a comparison: the choice of frames and views, and the input of the program that draws them."""
+"""Pictures of a comparison: the choice of frames and views, and the job for the program that draws the pictures."""
 
 import logging
 import math
@@ -27,16 +27,17 @@ log = logging.getLogger(__name__)
 
 PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
 SECONDS = 600  # time limit of the drawing program
-# Principal moments with a relative difference below this, far above round-off, count as equal; coordinate axes are used then.
+# Principal moments count as equal if their relative difference is below this value, which is far above round-off. The cameras
+# then look along coordinate axes.
 _TIES = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """A run at a frame ``number``: ``points`` (n, 3) [mm], and two pictures of it, ``sources``, once they are drawn.
+    """A run at a frame ``number``: the ``points`` (n, 3) [mm] and, once they are drawn, two pictures (``sources``).
 
-    A candidate also has the ``distances`` (n,) [mm] of its vertices to the same vertices of the reference, whose points
-    are the ``outline`` (n, 3).
+    For a candidate, ``distances`` (n,) [mm] are the distances of its vertices from the same vertices of the reference, and
+    ``outline`` (n, 3) contains the points of the reference.
     """
 
     name: str
@@ -48,7 +49,7 @@ class Shot:
 
 
 def shots(comparison: Comparison) -> list[Shot]:
-    """The reference at rest and at its greatest displacement, and each candidate at its worst frame that can be drawn."""
+    """Shots of the reference at rest and at its maximum displacement, and of each candidate at its worst drawable frame."""
     reference = comparison.reference
     travel = to_same_vertex(reference, at_rest(reference)).max(axis=1)
     furthest = int(np.argmax(np.where(np.isfinite(travel), travel, -1.0)))
@@ -58,12 +59,12 @@ def shots(comparison: Comparison) -> list[Shot]:
 
 
 def of_comparison(comparison: Comparison) -> tuple[list[Shot], str]:
-    """The figures of the runs of a comparison, each at its worst frame; if software is missing, no figures and a message."""
+    """The shots of a comparison with their pictures, and an empty message; if software is missing, no shots and a message."""
     return figures(comparison.setup, comparison.reference.surface, shots(comparison))
 
 
 def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Shot], str]:
-    """The figures of ``wanted``; if software is missing, no figures and a message."""
+    """The shots ``wanted`` with their pictures, and an empty message; if software is missing, no shots and a message."""
     try:
         drawn = draw(setup, surface, wanted)
     except MissingSoftware as error:
@@ -73,7 +74,7 @@ def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Sh
 
 
 def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes, bytes]]:
-    """Two WebP pictures of each shot; raises MissingSoftware if the drawing program fails."""
+    """Draw two WebP pictures of each shot. Raises MissingSoftware if the drawing program fails."""
     with scratch_folder() as folder:
         job = folder / "job.pickle"
         job.write_bytes(pickle.dumps(_job(setup, surface, wanted)))
@@ -90,7 +91,7 @@ def top(wanted: list[Shot]) -> float:
 
 
 def ticks(top: float) -> list[tuple[float, float]]:
-    """Round values from 0 to ``top``, and ``top`` itself, each after its ratio to ``top``.
+    """Ticks of a scale: round values from 0 to ``top``, and ``top`` itself, each preceded by its ratio to ``top``.
 
     >>> ticks(4.6)
     [(0.0, 0.0), (0.217, 1.0), (0.435, 2.0), (0.652, 3.0), (1.0, 4.6)]
@@ -112,10 +113,10 @@ def ramp() -> str:
 
 
 def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
-    """Unit vectors (2, 3) towards the cameras: along the smallest and the middle principal axis of the surface.
+    """Unit vectors (2, 3) towards the cameras, along the shortest and the middle principal axis of the surface.
 
-    The first view has the largest silhouette; the second is a quarter turn away about the long axis. Both cameras are on the
-    side away from the bones' vertices. An axis along which a bone given in closed form hides the surface comes last.
+    The first view shows the largest silhouette, and the second is rotated by 90 degrees about the long axis. Both cameras are on
+    the side away from the bones' vertices. If a bone in closed form hides the surface along an axis, this axis is used last.
     """
     middle = surface.points.mean(axis=0)
     spread = np.cov((surface.points - middle).T)
@@ -130,7 +131,7 @@ def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
 
 
 def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
-    """True if bones given in closed form hide most of ``points`` (n, 3), seen from a distance of four times ``view`` (3,)."""
+    """True if bones in closed form hide most of ``points`` (n, 3) from a viewer at a distance of four times ``view`` (3,)."""
     behind = np.zeros(len(points), bool)
     for solid in (bone.solid for bone in bones if bone.solid is not None):
         for step in np.arange(1, 17) / 4:
@@ -139,7 +140,7 @@ def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
 
 
 def _worst(comparison: Comparison, run: Run) -> Iterator[Shot]:
-    """The shot of a candidate at its worst frame; none if no frame is finite."""
+    """The shot of a candidate at its worst frame; nothing if no frame is finite."""
     distances = to_same_vertex(run, comparison.reference)
     drawable = np.isfinite(distances).all(axis=1)
     if not drawable.any():
@@ -151,7 +152,7 @@ def _worst(comparison: Comparison, run: Run) -> Iterator[Shot]:
 
 
 def _job(setup: Setup, surface: Surface, wanted: list[Shot]) -> dict[str, Any]:
-    """The input of the drawing program, by the names in ``pictures``."""
+    """The job for the drawing program, as the module ``pictures`` describes it."""
     shots = [
         {"points": shot.points, "distances": shot.distances, "outline": shot.outline}
         | {"poses": [bone.pose(shot.number) for bone in setup.bones]}

@@ -15,12 +15,12 @@ from fem_reference.report.tables import exerted, spread
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 
-# The statistics printed for a comparison; the page, the JSON and the CSV file have all statistics.
+# The statistics that are printed for a comparison; the page and the JSON and CSV files contain all statistics.
 PRINTED = tuple(key for key in described("table") if not key[1].endswith("_percent"))
 
 
 def case_facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
-    """The main facts about a case before it is solved, as words and numbers by name."""
+    """The main facts about a case that are known before it is solved, by name."""
     return {
         "case": case.name,
         "title": case.title,
@@ -37,7 +37,7 @@ def case_facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
 
 
 def comparison_text(result: Comparison) -> str:
-    """The result of a comparison, line by line: its runs, its worst numbers and its verdicts."""
+    """The result of a comparison as lines of text: its runs, error bars, worst deviations and verdicts."""
     runs = [f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in result.runs]
     runs += [f"reference: doubtful, {why}" for why in result.doubts if why != result.reference.outcome.status]
     runs += [f"{name}: no answer, not ranked: {why}" for name, why in result.unsound.items()]
@@ -52,7 +52,7 @@ def comparison_text(result: Comparison) -> str:
 
 
 def _judged(verdict: Verdict) -> str:
-    """A verdict as a line of text; a number without a unit has more digits."""
+    """A verdict as a line of text; values without a unit have more digits."""
     expected = verdict.expectation
     if verdict.unit == "1":
         truth = f"expected {verdict.truth:.6g} within {verdict.within:.3g}"
@@ -65,7 +65,7 @@ def _judged(verdict: Verdict) -> str:
 
 
 def _measured(name: str, measures: Iterable[Measure]) -> list[str]:
-    """A line for each number of a field."""
+    """A line for each value of ``measures`` of a field."""
     return [f"{name} {one.metric}: {_number(value)}" for one in measures for value in one.values]
 
 
@@ -74,7 +74,7 @@ def _number(value: float) -> str:
 
 
 def _worst(result: Comparison) -> list[str]:
-    """A line for each candidate with its worst deviations in the ``PRINTED`` statistics; for fields, a line for each number."""
+    """A line for each candidate with its worst deviations in the ``PRINTED`` statistics; for fields, a line for each value."""
     if "field" in result.reference.carries:
         measured = {"reference": result.changes["reference"]} | result.deviations
         return [line for name, measures in measured.items() for line in _measured(name, measures)]
@@ -90,7 +90,7 @@ def _worst(result: Comparison) -> list[str]:
 
 
 def _known(result: Comparison) -> list[str]:
-    """Error bars of the reference, one line for each statistic; no lines without error bars."""
+    """A line for each statistic with an error bar of the reference; no lines without error bars."""
     if result.error_bars is None:
         return []
     lines = ["error bars of the reference (the maximum change from rest, and the widest error bar of this change):"]
@@ -115,6 +115,6 @@ def _bar(result: Comparison, bar: ErrorBar) -> str:
 
 
 def run_text(run: Run, found: Alone) -> str:
-    """The result of a run without a comparison, line by line."""
+    """The result of a run without a comparison, as lines of text."""
     printed = [f"{run.name}: {run.outcome.status}, {run.outcome.message}", *_measured(run.name, found.measures)]
     return "\n".join([*printed, *map(_judged, found.verdicts), f"stored in {run.folder}"])

@@ -1,6 +1,6 @@
-"""Pages: their record, their templates, how they are written, and their head, a description that the index shows.
+"""Pages: their record, their templates and their files. The head of each file describes the page for the index.
 
-Only the command that made a page overwrites it.
+A page is overwritten only by the command that made it.
 """
 
 import base64
@@ -38,10 +38,10 @@ Headlines = tuple[tuple[str, str, str], ...]
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """The ``kind`` of a page, its ``title``, and its ``headlines``: name, verdict (may be empty) and sentence of each.
+    """The ``kind`` of a page, its ``title``, and its ``headlines``, each with a name, a verdict (may be empty) and a sentence.
 
-    ``contents`` fill the ``template`` of the page. ``numbers``, if any, are written next to the page as JSON, and ``rows`` as CSV,
-    under ``numbers_name`` or else the name of the page.
+    ``contents`` fill the ``template`` of the page. ``numbers`` are written next to the page as JSON, and ``rows`` as CSV, if they
+    are given. The name of these files is ``numbers_name``, by default the name of the page.
     """
 
     kind: str
@@ -54,14 +54,14 @@ class Page:
     numbers_name: str = ""
 
     def html(self) -> str:
-        """The page as text, without its facts in its head."""
+        """The page as HTML, without the facts in its head."""
         return template(self.template).render(self.contents | {"title": self.title})
 
 
 @dataclass(frozen=True)
 class PageHead:
-    """The facts in the head of a page: the facts of its ``Page``; the command that ``asked`` for it, empty if a program wrote it;
-    the time when it was ``made``; and the source of its thumbnail (``picture``), empty without a thumbnail.
+    """The facts in the head of a page: kind, title and headlines of its ``Page``; the command that ``asked`` for the page, empty if
+    a program wrote it; the time when the page was ``made``; and the source of its thumbnail (``picture``), empty without one.
     """
 
     kind: str
@@ -88,7 +88,7 @@ def write(page: Page, folder: Path, name: str, asked: str = "") -> Path:
 
 
 def stamped(page: Page, asked: str = "") -> str:
-    """The page as text, with the facts in its head and the command that made it above its title."""
+    """The page as HTML, with the facts in its head, and with the command that made it above the title."""
     text = page.html()
     made = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M") if asked else ""
     head = PageHead(page.kind, page.title, page.headlines, asked, made, small_picture(text))
@@ -110,8 +110,8 @@ def read(path: Path) -> PageHead | None:
 
 
 def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]:
-    """The ``name``, with a number if needed, for which ``where(name)`` has no page or one made by the same command; and a
-    line that reports an existing page, else an empty string.
+    """A name for a page, and a line that reports an existing page (empty if there is none). The name is the first of ``name``,
+    ``name-2``, ... for which the path ``where(name)`` is free or has a page that the same command made.
     """
     for i in count(1):
         numbered = name if i == 1 else f"{name}-{i}"
@@ -125,7 +125,7 @@ def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]
 
 
 def small_picture(text: str) -> str:
-    """The thumbnail of the first picture of a page, empty if none can be read."""
+    """The source of a thumbnail of the first picture of a page; empty if no picture can be read."""
     found = _PICTURE.search(text)
     if found is None:
         return ""
@@ -144,13 +144,13 @@ def by_name(*functions: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
 
 
 def template(name: str) -> jinja2.Template:
-    """The template in the file ``name`` next to this one: its contents are escaped, and an undefined name is an error."""
+    """The template in the file ``name`` next to this module. Its contents are escaped, and an undefined name is an error."""
     return _environment().get_template(name)
 
 
 @cache
 def _environment() -> jinja2.Environment:
-    """The environment of the templates, which are compiled at first use."""
+    """The environment of the templates, which compiles each template at its first use."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,

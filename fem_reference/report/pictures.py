@@ -1,10 +1,11 @@
-"""The program that draws the pictures of a job file: ``python -P pictures.py JOB.pickle FOLDER``.
+"""Program that draws the pictures of a job file: ``python -P pictures.py JOB.pickle FOLDER``.
 
-It is a separate process, as VTK ends the drawing process without an exception if there is no OpenGL library.
+It runs as a separate process, because VTK ends its process without an exception if there is no OpenGL library.
 
 The job has ``top``, the end of the colour scale [mm]; ``triangles`` (m, 3); ``directions`` (2, 3) towards the two cameras; points
-and triangles of each of the ``bones``; and ``shots``: ``points`` (n, 3), ``poses`` of the bones (4, 4), ``distances`` (n,) [mm] to
-colour by, and ``outline`` (n, 3), a body whose outline is drawn on top (both or None). View k of shot i is written to ``i_k.webp``.
+and triangles of each of the ``bones``; and ``shots``. Each shot has ``points`` (n, 3), and ``poses`` (4, 4) of the bones. It may
+have ``distances`` (n,) [mm], which determine colours, and ``outline`` (n, 3), a body whose outline is drawn on top; otherwise both
+are None. View k of shot i is written to ``i_k.webp``.
 """
 
 import pickle
@@ -20,7 +21,7 @@ from PIL import Image
 COLOURS = "viridis"
 SIDE = 840
 _OVERSAMPLING = 2
-# A pixel of a body belongs to its outline if a pixel at a distance of four pixels is outside the body.
+# A pixel of a body belongs to the outline of the body if a pixel four pixels away is outside the body.
 _NEAR = np.logical_and.outer(*[np.isin(np.arange(9), (0, 4, 8))] * 2)
 _MUSCLE, _BONE, _LINE = "#b4574e", "#dedbd4", (25, 25, 25)
 
@@ -45,8 +46,8 @@ def _surface(points: NDArray[Any], triangles: NDArray[Any]) -> Any:
 
 
 def thinned(points: NDArray[Any], triangles: NDArray[Any], count: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Points and triangles, reduced to about ``count`` triangles by quadric errors (Garland and Heckbert 1997,
-    doi 10.1145/258734.258849): for pictures, not for computation. ``points`` (n, 3), ``triangles`` (m, 3) of any kind.
+    """Reduce ``points`` (n, 3) and ``triangles`` (m, 3) to about ``count`` triangles by quadric errors (Garland and Heckbert 1997,
+    doi 10.1145/258734.258849). The result is good enough for pictures, not for computation.
     """
     import pyvista
 
@@ -74,7 +75,9 @@ def _view(job: dict[str, Any], shot: dict[str, Any], bones: list[Any], direction
 
 
 def _camera(points: NDArray[Any], frame: NDArray[Any], direction: NDArray[Any]) -> dict[str, Any]:
-    """A parallel camera that looks from ``direction`` at the body ``frame``, and sees ``points`` within twice the body's size."""
+    """A camera with parallel projection that looks from ``direction`` at the body ``frame`` (n, 3). The view also includes
+    ``points``, up to twice the size of the body.
+    """
     middle = (frame.max(axis=0) + frame.min(axis=0)) / 2
     own, both = (float(np.linalg.norm(cloud - middle, axis=1).max()) for cloud in (frame, np.vstack([frame, points])))
     up = (0.0, 0.0, 1.0) if abs(direction[2]) < 0.95 else (0.0, 1.0, 0.0)

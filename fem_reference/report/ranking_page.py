@@ -1,4 +1,4 @@
-"""The page ``table-5-1``: speed and accuracy of solvers in numbers; the report rates them with plus and minus signs."""
+"""The page ``table-5-1``: speed and accuracy of solvers in numbers, where the report has plus and minus signs."""
 
 import math
 from typing import Any
@@ -18,7 +18,7 @@ from fem_reference.report.words import under_load
 
 # The columns of the tables of scenes: metric, statistic, heading, unit.
 COLUMNS = tuple((*key, one.label, one.full_unit) for key, one in described("solvers").items())
-# Columns of the first table, over all scenes.
+# The columns of the first table, which is over all scenes.
 OVER_ALL = tuple((*key, one.label, one.full_unit) for key, one in described("scenes").items())
 _MARKS = "osD^vPX*<>"
 
@@ -38,7 +38,7 @@ def page(table: Table) -> Page:
 
 
 def _load(table: Table) -> str:
-    """A warning if solvers were timed on a machine that was busy with other work, else empty."""
+    """A warning if solvers were timed on a machine that was busy with other work; otherwise empty."""
     timed = (one.outcome.cost for one in table.results if one.seconds_per_frame)
     return under_load((cost.get(LOAD, math.nan) for cost in timed), LOADED)
 
@@ -91,7 +91,9 @@ def _row(one: SolverResult) -> dict[str, Any]:
 
 
 def _drawing(table: Table) -> Drawing:
-    """Deviation of the surface against the time per frame, for every solver on every scene; with legends of colours and marks."""
+    """A drawing of the surface deviation of every solver on every scene against its time per frame number. Colours distinguish
+    solvers, and marks distinguish scenes.
+    """
     shown = [(one, place) for one in table.results if (place := _place(one)) is not None]
     # The reference is drawn first.
     colours = looks(_label_of(one) for one, _ in sorted(shown, key=lambda pair: not pair[0].of_reference))
@@ -116,7 +118,7 @@ def _drawing(table: Table) -> Drawing:
 
 
 def _label_of(one: SolverResult) -> str:
-    """The name of a solver, with its kind if it is not ours, as it may have the name of one of our solvers."""
+    """The name of a solver. A solver that is not ours has its kind added, as its name may be that of one of our solvers."""
     ours = one.of_reference or one.solver != "recorded"
     return one.name if ours else f"{one.name} ({one.kind.lower()})"
 

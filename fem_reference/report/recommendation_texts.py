@@ -34,7 +34,9 @@ def facts(found: Recommendation, metric: str) -> dict[str, object]:
 
 
 def text(found: Recommendation, case: str, metric: str, unit: str, limit: float) -> str:
-    """The setting, or the one nearest to the ``limit`` of the error, with its error in a ``unit``, its time and its evidence."""
+    """The recommended setting or, if no setting meets the request, the nearest setting; with its error, its time and the evidence.
+    ``limit``: the requested limit of the error; ``unit``: the unit of both.
+    """
     alike = "the studied case" if len(found.of) == 1 else "the studied cases"
     measured = "measured on it" if found.measured else f"expected from {listed(list(found.of))}, {alike} most like it"
     one, lines = found.best or found.nearest, list[str]()
@@ -59,7 +61,7 @@ def text(found: Recommendation, case: str, metric: str, unit: str, limit: float)
 
 
 def answer_texts(found: Iterable[Answer], unit: str) -> list[str]:
-    """The answers in a sentence each: the request, the setting, its error in a ``unit`` with the bar of the truth, and its time."""
+    """A sentence for each answer: the request, the setting, its error in a ``unit`` including the truth's bar, and its time."""
     return [f"{asked_for(one, unit)}: {_answer(one, unit)}" for one in found]
 
 
@@ -101,7 +103,7 @@ def _answer(one: Answer, unit: str) -> str:
 
 
 def _parts(one: Expected, unit: str, *, measured: bool) -> str:
-    """The parts of an error: the part measured on the case itself, and the bar of the truth."""
+    """The parts of an error in words: the part that was measured on the case itself, and the error bar of the truth."""
     if not measured:
         return " with margins and the bars of the truths"
     if not one.bar > 0:
@@ -112,7 +114,7 @@ def _parts(one: Expected, unit: str, *, measured: bool) -> str:
 
 
 def _reason(one: Expected, unit: str, limit: float) -> list[str]:
-    """The bar of the truth, if it is the reason why the nearest setting does not meet the ``limit`` of the error."""
+    """A line about the error bar of the truth, if this is why the nearest setting does not meet the ``limit`` of the error."""
     if one.bar >= limit:
         known = f"{number(one.bar)} {unit}"
         return [f"the error bar of the truth is {known}: no smaller error can be proven"]

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 from fem_reference.assessment.regression import WORST_FIRST, Check, Judgement, Question
 from fem_reference.io.texts import finite
 
-# The maximum number of judgements listed in a text; the others are only counted.
+# The maximum number of judgements that a text lists; further judgements are only counted.
 MOST_ROWS = 15
 _COLUMNS = ("verdict", "question", "statistic", "frame", "was", "now", "allowed", "error bar")
 
@@ -36,7 +36,7 @@ def facts(check: Check) -> dict[str, Any]:
 
 
 def text(check: Check) -> str:
-    """The worst failures as lines of text, the reasons for inconclusive judgements, and the verdict."""
+    """Lines of text with the worst failures, the reasons for inconclusive judgements, and the verdict."""
     lines = _most([f"fail: {_named(one)} at frame {one.frame}: {one.why}" for one in _of(check, "fail")])
     open_: dict[str, list[str]] = {}
     for one in _of(check, "inconclusive"):
@@ -53,7 +53,7 @@ def text(check: Check) -> str:
 
 
 def markdown(check: Check) -> str:
-    """A heading with the verdict, both answers, a table of at most ``MOST_ROWS`` judgements, the worst first, and the notes."""
+    """A heading with the verdict, both answers, the notes, and a table of at most ``MOST_ROWS`` judgements, the worst first."""
     shown = check.judgements[:MOST_ROWS]
     lines = [f"### {check.word}: {_escaped(check.candidate)} on {_escaped(check.case)}", ""]
     lines += [f"- {_escaped(line)}" for line in (*_answers(check), *_notes(check))]
@@ -66,8 +66,10 @@ def markdown(check: Check) -> str:
 
 
 def junit(check: Check, seconds: float) -> str:
-    """A suite for the candidate, with a test case for each judgement, skipped if inconclusive. ``seconds`` is the check's time.
-    The verdict and the doubts about the reference are properties of the suite: a doubtful pass is not a failure.
+    """A JUnit suite for the candidate, with a test case for each judgement; inconclusive judgements count as skipped.
+
+    ``seconds``: the duration of the check. The verdict and doubts about the reference are properties of the suite, because a
+    doubtful pass is not a failure.
     """
     counts = {"tests": len(check.judgements), "failures": check.count("fail"), "errors": 0}
     counts |= {"skipped": check.count("inconclusive")}
@@ -90,7 +92,7 @@ def junit(check: Check, seconds: float) -> str:
 
 
 def lost(case: str, candidate: str, why: list[str]) -> tuple[str, str]:
-    """A JUnit suite with one error, and a Markdown text, which replace older files; both state ``why`` nothing was judged."""
+    """A JUnit suite with one error, and a Markdown text; both state ``why`` nothing was judged, and replace older files."""
     name, reasons = f"{case}.{candidate}", "\n".join(why)
     root, suite = _suite(name, {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"})
     element = ElementTree.SubElement(suite, "testcase", {"classname": name, "name": "solvers", "time": "0"})
@@ -123,7 +125,7 @@ def _named(one: Judgement) -> str:
 
 
 def _most(lines: list[str]) -> list[str]:
-    """The first ``MOST_ROWS`` of ``lines``, and the number of the others."""
+    """The first ``MOST_ROWS`` of ``lines``, and a line with the number of further lines."""
     more = len(lines) - MOST_ROWS
     return [*lines[:MOST_ROWS], f"and {more} more, listed by --json and --junit"] if more > 0 else lines
 
@@ -133,7 +135,7 @@ def _few(names: list[str]) -> str:
 
 
 def _answers(check: Check) -> list[str]:
-    """Each question with its answer and the number of statistics with each verdict."""
+    """A line for each question, with its answer and the number of statistics with each verdict."""
     asked: tuple[tuple[Question, str], ...] = (
         ("unchanged", "as it was"),
         ("within", "as near to the reference as allowed"),

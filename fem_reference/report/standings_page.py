@@ -1,4 +1,4 @@
-"""The page ``standings``: solvers of all kinds, in one table over all cases and in a table for each case."""
+"""The page ``standings``: a table of solvers of all kinds over all cases, and a table for each case."""
 
 from fem_reference.assessment.standings import ERROR, MATCHED_ERROR, MATCHED_TIME, Standing, Standings
 from fem_reference.metrics import described
@@ -29,7 +29,7 @@ def page(found: Standings) -> Page:
 
 
 def text(found: Standings) -> str:
-    """The rows, the missing rows and the changes, as lines of text."""
+    """The rows, the reasons for missing rows and the changes, as lines of text."""
     lines = [_line(row) for case in found.cases for row in found.of(case)]
     lines += [f"{name}: left out, {why}" for name, why in found.missing.items()]
     return "\n".join([*lines, *(f"changed: {line}" for line in found.changes)])

@@ -1,4 +1,4 @@
-"""The page of hard cases: a matrix of cases by solvers, with the result in each cell."""
+"""The page of hard cases: a matrix with a row for each case, a column for each solver and a result in each cell."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ _MARKS = {"ok": "✓", "degraded": "~", "failed": "✗", "inconclusive": "?"}
 _MARKS |= {"not applicable": "\N{EN DASH}", "no solution": "∅"}
 _WITHOUT_DEFECT = ("ok", "not applicable", "no solution")
 _SIDE, _OVERSAMPLING = 220, 2
-# The camera looks along this direction, from in front, above and to the right.
+# The camera looks along this direction, from the front, from above and from the right.
 _VIEW = np.array([-0.55, 0.7, -0.45])
 _MARK = "#3b6cf0"
 _LIT, _DARK, _BACK, _EDGE = (205, 120, 110), (120, 55, 48), (90, 130, 190), (60, 30, 26)
@@ -31,7 +31,7 @@ def page(found: Stress) -> Page:
 
 
 def summary(found: Stress) -> str:
-    """The number of cells of each verdict, in words."""
+    """The number of cells with each verdict, in words."""
     counts = [sum(cell.verdict == verdict for cell in found.cells) for verdict in VERDICTS]
     parts = ", ".join(f"{count} {verdict}" for count, verdict in zip(counts, VERDICTS, strict=True))
     solvers = found.solvers[0] if len(found.solvers) == 1 else f"{len(found.solvers)} solvers"
@@ -50,7 +50,9 @@ def text(found: Stress) -> str:
 
 
 def picture(scene: Scene) -> str:
-    """The body as an image: triangles lit from the camera, blue where the inner side is visible, and a ring at ``scene.place``."""
+    """The body as an image. Triangles are lit from the camera, and blue if their inner side is visible. A ring marks the position
+    ``scene.place``.
+    """
     forward = _VIEW / np.linalg.norm(_VIEW)
     right = np.cross(forward, [0, 0, 1.0])
     right /= np.linalg.norm(right)
@@ -85,8 +87,9 @@ def _colour(facing: float) -> tuple[int, int, int]:
 
 
 def history(of: History, bound: float) -> dict[str, Any]:
-    """The drawing of a quantity over frames: the title, the ``points``, the positions of frames without a number (``lost``), the
-    height of the bound (``limit``), and both ends of each axis; logarithmic if a value exceeds 30 times the ``bound``.
+    """The drawing of a quantity over frames: its title, the ``points`` of its line, the positions of frames without a number
+    (``lost``), the height of the bound (``limit``), and both ends of each axis. The axis of values is logarithmic if a value
+    exceeds 30 times the ``bound``.
     """
     values = np.asarray(of.values, float)
     known = np.isfinite(values)

@@ -1,4 +1,4 @@
-"""The page of a study: error against cost, the best solver at the same cost or error, and the cost of half the error."""
+"""The page of a study: error against cost, the best solver at equal cost or error, and the cost of halving the error."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -25,7 +25,7 @@ from fem_reference.report.words import title_of as in_words
 
 REFERENCE = "fenicsx"
 TIME = "seconds_per_frame"
-# The statistic in the tables, and the costs in which solvers are made equal to compare their errors.
+# The statistic in the tables. The errors of solvers are compared at equal values of each of the costs ``MATCHED``.
 MAIN = next(map(".".join, described("rank")))
 MATCHED = (TIME, "peak_memory_mb", "unknowns")
 
@@ -69,7 +69,7 @@ def page(study: Study) -> Page:
 
 
 def shown(case: CaseStudy) -> list[str]:
-    """The statistics with a front: those with errors at two or more points (a case without joints has no moment arms)."""
+    """The statistics with a front: those with errors at two or more points. Moment arms, for example, require joints."""
     known = [name for point in case.points for name in point.errors]
     return [name for name in map(".".join, described("rank")) if known.count(name) > 1]
 
@@ -110,7 +110,9 @@ def _sentence(one: Price, unit: str, bar: float) -> str:
 
 
 def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Match]]]:
-    """Tables at equal time, memory, unknowns and error: the common quantity, the compared quantity, and the rows."""
+    """Tables at equal time, memory, unknowns and error. Each has the quantity that is equal, the quantity that is compared, and
+    rows.
+    """
     asked = [(case.counted, cost, cost, error) for cost in MATCHED]
     # An error of "at most" a value includes the bar of the truth, as in the verb recommend.
     asked.append((case.certain, TIME, error, TIME))
@@ -125,13 +127,13 @@ def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Mat
 
 
 def answered(case: CaseStudy) -> tuple[Answer, ...]:
-    """The answers to the usual requests, from the settings that the verb recommend considers; none for a case without settings."""
+    """The answers to the usual requests, from the settings that the verb recommend considers; empty for a case without settings."""
     known = known_settings(case.features, case.case, [case], MAIN).settings
     return answers(known) if known else ()
 
 
 def load_of(points: Iterable[Point]) -> str:
-    """A warning if times of ``points`` were measured on a machine that was busy with other work, else empty."""
+    """A warning if times of ``points`` were measured on a machine that was busy with other work; otherwise empty."""
     return under_load((point.load for point in points if point.status == "converged"), LOADED)
 
 
@@ -146,7 +148,7 @@ def left_out(case: CaseStudy) -> list[Point]:
 
 
 def front(case: CaseStudy, error: str) -> Drawing:
-    """Error against time for one of the statistics."""
+    """A drawing of error against time for a statistic."""
     title = title_of(error).capitalize()
 
     def draw(figure: Figure, axes: Axes) -> None:
@@ -167,7 +169,7 @@ def front(case: CaseStudy, error: str) -> Drawing:
 
 
 def _draw_answers(axes: Axes, found: Iterable[Answer]) -> None:
-    """The limits of requests as lines, and the best setting of each as a numbered diamond."""
+    """Draw the limits of requests as lines, and the best setting for each request as a numbered diamond."""
     numbers = dict[tuple[float, float], list[str]]()
     for i, one in enumerate(found):
         for limit, line in ((one.limits.get("error"), axes.axhline), (one.limits.get("time"), axes.axvline)):
@@ -181,7 +183,9 @@ def _draw_answers(axes: Axes, found: Iterable[Answer]) -> None:
 
 
 def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
-    """Each point twice: with its measured error, which may be below the bar of the truth, and with the error that counts."""
+    """Pairs of a point with its measured error, which may be below the error bar of the truth, and the point with the error that
+    counts.
+    """
     return [
         (replace(point, errors=point.errors or counted.errors), counted)
         for point, counted in zip(case.points, case.counted, strict=True)
@@ -189,7 +193,7 @@ def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
 
 
 def _draw(axes: Axes, points: Sequence[tuple[Point, Point]], error: str, solver: str, colour: str) -> None:
-    """Draw the points of a solver, the front of the errors that count as a line, and its default settings as rings."""
+    """Draw the points of a solver as dots, the front of the errors that count as a line, and default settings as rings."""
     pairs = [(point, pair) for point, _ in points if (pair := point.at(error, TIME))]
     if not pairs:
         return
@@ -201,12 +205,12 @@ def _draw(axes: Axes, points: Sequence[tuple[Point, Point]], error: str, solver:
 
 
 def _plot(axes: Axes, pairs: list[tuple[float, float]], *style: str, **look: Any) -> None:
-    """Draw pairs of an error and a cost, the cost along the horizontal axis."""
+    """Draw pairs of an error and a cost, with the cost on the horizontal axis."""
     axes.plot([cost for _, cost in pairs], [error for error, _ in pairs], *style, **look)
 
 
 def _data(study: Study) -> dict[str, Any]:
-    """The data of the drawing with selectable axes."""
+    """The data for the drawing whose axes the reader selects."""
 
     def facts(one: Point) -> dict[str, Any]:
         named = {name: getattr(one, name) for name in ("solver", "label", "errors", "costs")}

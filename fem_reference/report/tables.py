@@ -22,20 +22,21 @@ COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 # The columns of the first table: metric, statistic, heading of the group, heading of the column, unit.
 DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in described("table").items())
 
-# The same springs at points of the surface and over facets of the tetrahedra, on gluteus_medius and gluteus_maximus at 1 rad.
+# Measured with the same springs at points of the surface and over facets of tetrahedra, on two hip muscles (gluteus_medius and
+# gluteus_maximus) at 1 rad.
 SPREAD = (
     "Attachments are springs, and 5 to 9 % of a force or moment depend on how the same springs are spread over them (5.3 and "
-    "8.8 % for two hip muscles): error bars of forces and moments exclude this effect, which is reported as that of another model"
+    "8.8 % for two hip muscles): error bars of forces and moments exclude this effect. It is reported as that of another model"
 )
 
 
 def summary(comparison: Comparison) -> dict[str, Any]:
     """Everything that was measured, as valid JSON: a number that is not finite is None.
 
-    ``measures``: each candidate's deviation from the reference; under ``"reference"`` the reference's change from rest, with its
-    recorded forces and inversion numbers. ``doubts``: the reasons to doubt the reference, in words. ``from_rest``: the change from
-    rest of every run, with its forces. ``error_bars``: bars of the reference; ``rankings``: the solvers that the bars separate;
-    both are empty without bars. ``unsound``: the reasons why frames of candidates are not valid.
+    ``measures``: the deviation of each candidate from the reference; rows of the ``"reference"`` are its change from rest, its
+    recorded forces and its smallest det F. ``doubts``: the reasons to doubt the reference, in words. ``from_rest``: the change from
+    rest of every run, with its forces. ``error_bars``: error bars of the reference; ``rankings``: solvers that the error bars
+    distinguish; both are empty without error bars. ``unsound``: the reasons why frames of candidates are not valid.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
@@ -80,7 +81,7 @@ def as_csv(rows: Iterable[dict[str, Any]]) -> str:
 
 
 def known(comparison: Comparison) -> tuple[ErrorBar, ...]:
-    """The error bars of the reference, if there are any."""
+    """The error bars of the reference; empty if there are none."""
     return () if comparison.error_bars is None else comparison.error_bars.bars
 
 
@@ -91,13 +92,13 @@ def spread(comparison: Comparison) -> str:
 
 
 def inversion(run: Run) -> tuple[Measure, ...]:
-    """The smallest det F per frame [1] that a solver recorded (scalars ``min_det_F...``), as measures."""
+    """The smallest det F [1] in each frame, if a solver recorded it (scalars ``min_det_F...``), as measures."""
     names = [name for name in run.scalars if name.startswith("min_det_F")]
     return tuple(Measure("inversion", name, "1", run.scalars[name]) for name in names)
 
 
 def exerted(run: Run) -> tuple[Measure, ...]:
-    """The recorded forces [N] and moments about the origin [N mm] on each bone, as measures: magnitudes by bone, and components."""
+    """The recorded forces [N] and moments about the origin [N mm] on each bone as measures: the magnitude and the components."""
     found = list[Measure]()
     for kind, unit in {"force_on_": "N", "moment_on_": "N mm"}.items():
         parts = {name.removeprefix(kind): values for name, values in run.scalars.items() if name.startswith(kind)}
@@ -110,7 +111,7 @@ def exerted(run: Run) -> tuple[Measure, ...]:
 
 
 def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
-    """One row for each statistic and frame, with the keys ``COLUMNS``."""
+    """One row for each statistic and frame, as a dictionary with the keys ``COLUMNS``."""
     return [
         dict(zip(COLUMNS, (run.name, one.metric, one.statistic, number, finite(value), one.unit), strict=True))
         for one in measures
@@ -119,7 +120,7 @@ def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
 
 
 def _bar_rows(comparison: Comparison, bar: ErrorBar) -> list[dict[str, Any]]:
-    """One row for each frame; ``model``: the change of the statistic with another model of springs."""
+    """One row for each frame of an error bar. The key ``model`` has the change of the statistic with another model of springs."""
     columns = {"of": bar.of, "metric": bar.metric, "statistic": bar.statistic, "unit": bar.unit}
     model = [None] * len(bar.values) if bar.model is None else [finite(value) for value in bar.model]
     return [

@@ -12,7 +12,7 @@ from fem_reference.report.drawings import REFERENCE, Drawing, drawn, looks, over
 from fem_reference.report.pages import Page
 from fem_reference.report.words import listed, number
 
-# Room above and below a band for the lines of candidates, in heights of the band.
+# Room above and below a band for the lines of candidates, relative to the height of the band.
 _BEYOND = 1.5
 _SHADE, _FIRST, _TOTAL = "#888888", "#0072b2", "#56b4e9"
 
@@ -38,7 +38,9 @@ def page(found: Uncertainty) -> Page:
 
 
 def sentences(found: Uncertainty) -> list[str]:
-    """The result in sentences: the band of the surface, the reference's error bar, the main source, and verdicts on candidates."""
+    """The result in sentences: the band of the surface, the error bar of the reference, the main source of variation, and verdicts
+    on candidates.
+    """
     if found.refused:
         return [f"No band: {found.refused}."]
     said = [_sentence(found, band) for band in found.bands[:1] if not band.refused]
@@ -71,7 +73,7 @@ def _sentence(found: Uncertainty, band: Band) -> str:
 
 
 def ratio_of(band: Band) -> float | None:
-    """The ratio of the width of a band to the error bar of the reference, None if either is unknown."""
+    """The ratio of the width of a band to the error bar of the reference; None if either is unknown."""
     bar = band.greatest_bar
     return band.width / bar if bar > 0 and not math.isnan(band.width) else None
 
@@ -93,10 +95,10 @@ def verdict(one: Placed | None, unit: str) -> tuple[str, str]:
 
 
 def drawing(found: Uncertainty, band: Band) -> Drawing:
-    """A band over the frames, with the error bar of the reference and the candidates. The result of the case is subtracted from
-    all, as a band would otherwise often be too narrow to see.
+    """A drawing of a band over the frames, with the error bar of the reference and the candidates. The result of the case is
+    subtracted from every curve, because a band would otherwise often be too narrow to see.
     """
-    title = band.title if band.distance else f"{band.title}: difference from that of the case"
+    title = band.title if band.distance else f"{band.title}: difference from the result of the case"
     return over_frames(f"band-{band.quantity}", title, band.unit, partial(_draw, found, band))
 
 
@@ -122,7 +124,7 @@ def _draw(found: Uncertainty, band: Band, axes: Axes) -> None:
 
 
 def shares(found: Uncertainty, band: Band) -> Drawing:
-    """The sensitivities of a quantity by parameter, as bars, or the reason why there are none."""
+    """A bar chart of the sensitivities of a quantity to each parameter, or the reason why there are none."""
     title = f"Shares of the variance: {band.title[0].lower()}{band.title[1:]}"
     if not band.first:
         return Drawing(title, missing=band.unreliable or "the quantity does not vary")
@@ -131,7 +133,7 @@ def shares(found: Uncertainty, band: Band) -> Drawing:
 
     def draw(_: Figure, axes: Axes) -> None:
         places = np.arange(len(keys))
-        axes.barh(places, [100 * band.total[key] for key in keys], 0.7, color=_TOTAL, label="alone and with others")
+        axes.barh(places, [100 * band.total[key] for key in keys], 0.7, color=_TOTAL, label="with interactions")
         axes.barh(places, [100 * band.first[key] for key in keys], 0.4, color=_FIRST, label="alone")
         axes.set_yticks(places, [titles[key] for key in keys])
         axes.set(xlabel="% of the variance over all frames", xlim=(0, 105))

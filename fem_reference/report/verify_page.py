@@ -21,12 +21,13 @@ from fem_reference.report.words import duration, number, words
 _OF_ENTRY = ("name", "group", "title", "unit", "kind", "relative", "because", "source", "negative_control")
 _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
 PASS, FAIL = "#14713a", "#b3261e"
-LEAST, GREATEST = 1e-8, 1e3  # the range of error / tolerance in the overview; values outside it are drawn at the edge
+# The range of error / tolerance in the overview; values outside the range are drawn at its edge.
+LEAST, GREATEST = 1e-8, 1e3
 _ROW = 0.175  # height of a row of the overview [in]
 
 
 def page(verification: Verification) -> Page:
-    """The page of the results of entries."""
+    """The page of the results of a verification."""
     results = verification.results
     judged = {name: [one for one in group if one in verification.judged] for name, group in verification.groups.items()}
     contents = {
@@ -43,7 +44,7 @@ def page(verification: Verification) -> Page:
 
 
 def text(verification: Verification) -> str:
-    """One line for each result, in columns with headings, and the verdict."""
+    """A table with headings and one line for each result, followed by the verdict."""
     rows = [_HEADS, *map(_cells, verification.results)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     sides = ["<" if head in ("entry", "unit", "verdict") else ">" for head in _HEADS]
@@ -74,7 +75,7 @@ def facts(verification: Verification) -> dict[str, Any]:
 
 
 def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
-    """Each result with its entry as names, numbers and sentences."""
+    """A dictionary for each result, with the facts about its entry."""
     return [
         {
             **{name: getattr(one.entry, name) for name in _OF_ENTRY},
@@ -91,14 +92,14 @@ def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
 
 
 def share(one: Result) -> float:
-    """The error divided by its tolerance; NaN if nothing was measured, infinite for an error if no error is allowed."""
+    """The error divided by its tolerance; NaN if nothing was measured, infinite for any error if the tolerance is 0."""
     if one.within > 0:
         return one.error / one.within
     return one.error * math.inf if one.error else 0.0
 
 
 def overview(groups: dict[str, list[Result]]) -> Drawing:
-    """The error of every result divided by its tolerance, group by group."""
+    """A drawing of the error of every result divided by its tolerance, in groups."""
     results = [one for group in groups.values() for one in group]
     shown = [share(one) for one in results if LEAST <= share(one) <= GREATEST]
     low = 10.0 ** math.floor(math.log10(min([0.1, *shown]))) / 3
@@ -123,7 +124,7 @@ def overview(groups: dict[str, list[Result]]) -> Drawing:
 
 
 def _dot(axes: Axes, row: int, one: Result, limits: tuple[float, float]) -> None:
-    """Draw error / tolerance of a result: a hollow triangle if it is beyond the edge, a cross if it is not a number."""
+    """Draw error / tolerance of a result: as a hollow triangle beyond the edge of the range, and as a cross for NaN."""
     low, high = limits
     value = share(one)
     look: dict[str, Any] = {"color": PASS if one.word == "pass" else FAIL, "clip_on": False, "markersize": 5.5}
@@ -168,7 +169,7 @@ def drawable(one: Result) -> bool:
 
 
 def convergence(one: Result) -> Drawing:
-    """Error against mesh size on logarithmic axes, with a line whose slope is the integer nearest to the measured order."""
+    """A drawing of error against mesh size on logarithmic axes. The slope of a dashed line is the integer nearest to the order."""
     sizes, errors = _errors(one)
     order = one.finding.order
 

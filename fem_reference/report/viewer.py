@@ -1,17 +1,17 @@
-"""The 3D view of the page: every frame of every run, packed into the page with the library that draws it in a browser.
+"""The 3D view of the page: every frame of every run, packed into the page with the library that draws the view in a browser.
 
-``viewer.js`` unpacks one JSON object. Arrays in it are little-endian, compressed (gzip) and in base64:
+``viewer.js`` unpacks a JSON object. Arrays in this object are little-endian, compressed (gzip) and encoded in base64:
 
     library    text of each file of three.js
     frames     numbers (f,) of the frames drawn;  colours, both, warm  stops of the colour bars: for magnitudes, for signed values
                and for fibres
     low, step  position = low + step * integer from 0 to 65535 [mm]
     triangles  integers (m, 3), of 4 bytes, the same for every run
-    runs       name, worst (greatest distance to the reference [mm] and its frame's index), reached (f,), off (f,): number of
+    runs       name, worst (maximum distance to the reference [mm] and index of its frame), reached (f,), off (f,): number of
                vertices outside the box, and positions: integers (f, n, 3) of 2 bytes as differences from the previous
-               frame, zigzag (0, -1, 1, -2, ... as 0, 1, 2, 3, ...), all low bytes before all high bytes
+               frame, in zigzag encoding (0, -1, 1, -2, ... as 0, 1, 2, 3, ...), all low bytes before all high bytes
     bones      name, triangles, positions (1, n, 3) in the same form with its own low and step, poses (f, 16) by rows
-    force      the greatest force drawn [N];  attached  numbers of the vertices attached to bones
+    force      the maximum drawn force [N];  attached  indices of the vertices attached to bones
     and, as described in ``viewer_fields``: forces, quantities, levels and fibre points of the runs, bars, fibres, joints
     camera     middle (3,), half height of the picture [mm], directions (2, 3) towards the camera
 """
@@ -38,7 +38,7 @@ from fem_reference.report.viewer_fields import NEAR, Fields, arrows, joints
 from fem_reference.runs.store import Run, at_numbers
 
 THREE = Path(__file__).parent / "three"
-# Greatest number of bytes of all positions and levels before compression; compression and base64 together hardly change it.
+# The maximum number of bytes of all positions and levels before compression. Compression and base64 together hardly change it.
 BUDGET = 10_400_000
 BONE_TRIANGLES = 8000
 _LEVELS = 65535
@@ -56,7 +56,7 @@ class _Box:
         return cls(low, max(float((high - low).max()) / _LEVELS, 1e-9))
 
     def whole(self, points: Floats) -> NDArray[np.uint16]:
-        """The nearest integers; 0 for NaN, the edge of the box for points outside it."""
+        """The nearest integers of ``points``: 0 for NaN, and the edge of the box for points outside the box."""
         with np.errstate(invalid="ignore", over="ignore"):
             steps = np.clip(np.round((points - self.low) / self.step), 0, _LEVELS)
         return np.nan_to_num(steps, nan=0.0).astype(np.uint16)
@@ -66,11 +66,13 @@ class _Box:
 
 
 def view(comparison: Comparison, budget: int = BUDGET) -> dict[str, Any]:
-    """The contents of the template of the 3D view. ``data``: for the script; ``candidates``, ``quantities``: their names.
-    ``numbers``: frame numbers. ``every``: the stride of frames drawn, above 1 if positions would exceed ``budget`` bytes.
-    ``error``: the greatest error of a coordinate [mm]. ``warm``: colours of fibres; ``stretches``: labels of their scale.
-    ``force``: the greatest force drawn [N], 0 without forces. ``attached``, ``touched``: True if such vertices exist; ``near``: the
-    distance [mm] of touched vertices. ``version``, ``licence``: of the library.
+    """The contents of the template of the 3D view.
+
+    ``data``: the data for the script. ``candidates``, ``quantities``: their names. ``numbers``: frame numbers. ``every``: the
+    stride of drawn frames, above 1 if positions would exceed ``budget`` bytes. ``error``: the maximum error of a coordinate [mm].
+    ``warm``: the colours of fibres; ``stretches``: the labels of their scale. ``force``: the maximum drawn force [N], 0 without
+    forces. ``attached``, ``touched``: True if there are vertices that are attached to a bone or touch a bone; ``near``: the
+    distance [mm] within which a vertex touches. ``version``, ``licence``: those of the library.
     """
     shown = [comparison.reference, *(run for run in comparison.candidates if run.has_surface)]
     every = _every(shown, budget)
@@ -95,7 +97,7 @@ def view(comparison: Comparison, budget: int = BUDGET) -> dict[str, Any]:
 
 
 def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any]:
-    """The object that the module's docstring describes, for the runs ``shown``, the reference first."""
+    """The object that the docstring of the module describes, for the runs ``shown``, of which the first is the reference."""
     reference, numbers = comparison.reference, comparison.reference.numbers[::every]
     frames = {run.name: _frames(run, numbers) for run in shown}
     # Not empty, even if no frame was reached.
@@ -135,7 +137,7 @@ def _data(comparison: Comparison, shown: list[Run], every: int) -> dict[str, Any
 
 
 def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:
-    """The positions [%] and values of labels on the scale of stretches: its ends, and rest unless it is near an end."""
+    """The positions [%] and values of labels on the scale of stretches: at both ends, and at rest unless this is near an end."""
     low, high = fibres["low"], fibres["high"]
     rest = 100 * (1 - low) / ((high - low) or 1.0)
     middle = ((rest, 1.0),) if 12 < rest < 88 else ()
@@ -151,13 +153,15 @@ def _every(shown: list[Run], budget: int) -> int:
 
 
 def _frames(run: Run, numbers: tuple[int, ...]) -> Floats:
-    """Positions (f, n, 3) of a run at frame ``numbers``; all NaN in a frame that is not completely known."""
+    """Positions (f, n, 3) of a run at frame ``numbers``; NaN throughout a frame in which any position is not finite."""
     known = np.isfinite(run.positions).all(axis=(1, 2), keepdims=True)
     return at_numbers(run, np.where(known, run.positions, np.nan), numbers)
 
 
 def _box(reference: Floats, runs: list[Floats]) -> _Box:
-    """The box around all frames. As runs may scatter, it exceeds the reference's box by at most one diagonal on each side."""
+    """The box around all frames. As vertices of a run may scatter, the box extends beyond that of the reference by at most the
+    diagonal of the latter on each side.
+    """
     low, high = _bounds(reference)
     reach = float(np.linalg.norm(high - low))
     lows, highs = zip(*(_bounds(frames) for frames in [reference, *runs] if np.isfinite(frames).any()), strict=True)
@@ -173,7 +177,7 @@ def _stops(name: str) -> list[str]:
 
 
 def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> tuple[list[dict[str, Any]], float]:
-    """Every run, and the ``top`` of the colours: the greatest distance to the reference in a frame that is entirely in the box."""
+    """The facts of every run, and the ``top`` of the colours: the maximum distance to the reference over frames inside the box."""
     rows, top = [], 0.0
     for name, positions in frames.items():
         inside = ((positions >= box.low - box.step) & (positions <= box.low + (_LEVELS + 1) * box.step)).all(axis=2)
@@ -195,14 +199,14 @@ def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> tuple[list[di
 
 
 def _last_finite(frames: Floats) -> Floats:
-    """The frames; a frame that was not reached is replaced by the last reached frame before it, so that it adds few bytes."""
+    """The ``frames``, in which a frame that was not reached is replaced by the last reached frame before it to save bytes."""
     reached = np.isfinite(frames).all(axis=(1, 2))
     last = np.maximum.accumulate(np.where(reached, np.arange(len(frames)), 0))
     return np.asarray(frames[last])
 
 
 def _positions(frames: Floats, box: _Box) -> str:
-    """Positions (f, n, 3) in the form that the module's docstring describes."""
+    """Positions (f, n, 3) in the form that the docstring of the module describes."""
     whole = box.whole(frames)
     steps = np.diff(whole, axis=0, prepend=np.zeros_like(whole[:1])).view(np.int16)
     zigzag = ((steps << 1) ^ (steps >> 15)).view(np.uint16)
@@ -222,7 +226,7 @@ def _bone(bone: Bone, numbers: tuple[int, ...]) -> dict[str, Any]:
 
 
 def _camera(comparison: Comparison, frames: Floats) -> dict[str, Any]:
-    """The camera of the pictures, wide enough for the reference in all ``frames`` (f, n, 3)."""
+    """The camera of the pictures, with a field of view that contains the reference in all ``frames`` (f, n, 3)."""
     low, high = _bounds(frames)
     middle = (low + high) / 2
     return {

@@ -1,13 +1,13 @@
-"""Quantities that colour surfaces and fibres in the 3D view, in addition to the distance to the same vertex, in few bytes.
+"""Further data of the 3D view in few bytes: colours in addition to the distance to the same vertex, fibres, arrows and joints.
 
-quantities  name, signed, and top, the greatest magnitude [mm]: value = sign * top * (level / 127)^2
-runs        levels by quantity: (f, n) of one byte, as differences from the previous frame; most: the greatest magnitude by
-            quantity and frame; points: of the fibres, as positions
-bars        error bar [mm] of the reference by quantity and frame; null where it is unknown, absent without bars
-fibres      lines (k,): number of points of each; rest: length [mm] of each piece, line by line; low, high: range of stretches
-touched     for each run that touches a bone (f, n) of one byte: 1 within ``NEAR`` of a bone, except for attached vertices
-forces      arrows of each run by frame: point of application [mm] and force on a bone [N], six numbers each
-joints      name, unit, and angle or distance by frame of each bone that moves
+quantities  name, signed, and top, the maximum magnitude [mm]: value = sign * top * (level / 127)^2
+runs        levels by quantity: (f, n) of one byte, as differences from the previous frame; most: the maximum magnitude by
+            quantity and frame; points: positions of fibre points
+bars        error bar [mm] of the reference by quantity and frame; null in a frame without one, absent without error bars
+fibres      lines (k,): number of points of each line; rest: length [mm] of each segment, by line; low, high: range of stretches
+touched     for each run that touches a bone, (f, n) of one byte: 1 within ``NEAR`` of a bone, except for attached vertices
+forces      arrows of each run by frame: point of application [mm] and force on a bone [N], six numbers for each arrow
+joints      for each bone that moves: name, unit, and angle or distance by frame
 """
 
 import math
@@ -29,17 +29,17 @@ from fem_reference.problems.setup import Bone, Setup
 from fem_reference.report.at_frames import motions
 from fem_reference.runs.store import Run, at_numbers
 
-FIBRES, POINTS = 30, 12  # greatest number of fibres drawn, and of points of each
+FIBRES, POINTS = 30, 12  # the maximum number of fibres that are drawn, and of points of each fibre
 NEAR = 0.2  # distance [mm] within which a vertex touches a bone
 _LEVELS = 127
 # For each quantity, the statistic of the surface's deviation that is its maximum.
 _BARS = {"distance": "max", "surface": "hausdorff"}
-_FAR = 1e6  # distance [mm] beyond which a fibre is taken to be unknown
+_FAR = 1e6  # [mm]: a fibre with a coordinate beyond this value counts as unknown
 
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """The quantities of the ``runs`` drawn, the reference first, at frame ``numbers``."""
+    """The quantities of the drawn ``runs``, of which the first is the reference, at frame ``numbers``."""
 
     comparison: Comparison
     runs: list[Run]
@@ -53,7 +53,7 @@ class Fields:
 
     @cached_property
     def lines(self) -> tuple[Polylines, NDArray[np.int64]]:
-        """The drawn fibres, and the indices of their points."""
+        """The drawn fibres, and the indices of their points among all fibre points."""
         offsets = self.context.fibres.offsets
         chosen = np.unique(np.linspace(0, len(offsets) - 2, min(FIBRES, len(offsets) - 1)).round().astype(int)).tolist()
         spans = [(offsets[i], offsets[i + 1]) for i in chosen]
@@ -67,27 +67,29 @@ class Fields:
 
     @np.errstate(over="ignore", invalid="ignore")
     def points(self, run: Run) -> Floats:
-        """Positions (f, m, 3) [mm] of the fibre points drawn in a run, NaN in a frame that is not known."""
+        """Positions (f, m, 3) [mm] of the drawn fibre points in a run, NaN in a frame in which they are not known."""
         found = np.array(fibre_points(run, self.context)[:, self.lines[1]])
         found[~(np.abs(found) < _FAR).all(axis=(1, 2))] = np.nan
         return at_numbers(run, found, self.numbers)
 
     @cached_property
     def gaps(self) -> dict[str, Floats | None]:
-        """Distances (f, n) [mm] to the bones by name of the run, NaN if a vertex is exempt; None if a bone has no inside."""
+        """Distances (f, n) [mm] from vertices to the bones by name of the run; NaN for exempt vertices, None if a bone has no
+        inside.
+        """
         found = {run.name: (run, local_fields.to_bones(run, self.context)) for run in self.runs}
         return {
             name: None if gaps is None else at_numbers(run, gaps, self.numbers) for name, (run, gaps) in found.items()
         }
 
     def touched(self, run: Run) -> NDArray[np.bool_] | None:
-        """True (f, n) for vertices within ``NEAR`` of a bone and not attached; None if distances are not known."""
+        """True (f, n) for each vertex that is not attached but within ``NEAR`` of a bone; None if distances are not known."""
         gaps = self.gaps[run.name]
         return None if gaps is None else np.less_equal(gaps, NEAR)  # False for NaN
 
     @cached_property
     def surfaces(self) -> dict[str, dict[str, Floats]]:
-        """Values (f, n) [mm] by quantity and name of the run."""
+        """Values (f, n) [mm] of the signed distance and of the depth, by quantity and name of the run."""
         reference = self.runs[0]
         found: dict[str, dict[str, Floats]] = {"surface": {}, "depth": {}}
         for run in self.runs:
@@ -98,14 +100,14 @@ class Fields:
         return {name: values for name, values in found.items() if values}
 
     def quantities(self) -> list[dict[str, Any]]:
-        """The quantities that can be chosen, except the distance to the same vertex, which follows from the positions."""
+        """The quantities that the reader can select, except the distance to the same vertex, which follows from positions."""
         return [
             {"name": name, "signed": name == "surface", "top": _top(list(values.values()))}
             for name, values in self.surfaces.items()
         ]
 
     def levels(self, run: Run) -> dict[str, bytes]:
-        """The bytes of a run by quantity; 0 where the value is not known."""
+        """The levels of a run as bytes, by quantity; an unknown value has the level 0."""
         found = {}
         for name, values in self.surfaces.items():
             if run.name in values:
@@ -116,12 +118,12 @@ class Fields:
         return found
 
     def most(self, run: Run) -> dict[str, list[float]]:
-        """The greatest magnitude [mm] in each frame of a run, by quantity."""
+        """The maximum magnitude [mm] in each frame of a run, by quantity."""
         own = {name: values[run.name] for name, values in self.surfaces.items() if run.name in values}
         return {name: [float(f"{_top([frame]):.4g}") for frame in values] for name, values in own.items()}
 
     def bars(self) -> dict[str, list[float | None]]:
-        """The error bar of the greatest distance by quantity and frame; empty without bars."""
+        """The error bar of the maximum distance by quantity and frame; empty without error bars."""
         known = self.comparison.error_bars
         found: dict[str, list[float | None]] = {}
         if known is None:
@@ -134,9 +136,11 @@ class Fields:
         return found
 
     def fibres(self, points: list[Floats]) -> dict[str, Any]:
-        """The lines, and the range of stretches of their pieces, without extremes, at ``points`` (f, m, 3) [mm] of each run."""
+        """The drawn fibres, and the range of stretches of their segments over all runs, without extremes. ``points``: the
+        positions (f, m, 3) [mm] of fibre points in each run.
+        """
         lines, ends = self.lines[0], self.lines[0].offsets
-        # A piece joins a point of a line to the next one.
+        # A segment connects a point of a line to the next point.
         inside = np.delete(np.arange(max(len(lines.points) - 1, 0)), ends[1:-1] - 1)
 
         def lengths(places: Floats) -> Floats:
@@ -145,14 +149,14 @@ class Fields:
         rest = lengths(lines.points)
         stretches = np.concatenate([np.ones(1), *((lengths(own) / rest).ravel() for own in points)])
         known = stretches[np.isfinite(stretches)]
-        # Percentiles, so that no single piece sets the scale.
+        # Percentiles prevent single segments from determining the scale.
         low, high = (float(np.percentile(known, share)) for share in (0.1, 99.9))
         scale = {"low": min(low, 1.0), "high": max(high, 1.0)}
         return {"lines": np.diff(ends).tolist(), "rest": np.round(rest, 5).tolist(), **scale}
 
 
 def joints(bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> list[dict[str, Any]]:
-    """The angle [degrees] or the distance [mm] of each bone that moves, by frame."""
+    """The rotation angle [degrees] or the translation [mm] of each bone that moves, by frame."""
     return [
         {
             "name": one.name,
@@ -164,7 +168,7 @@ def joints(bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> list[dict[str, 
 
 
 def arrows(run: Run, setup: Setup, numbers: tuple[int, ...]) -> list[list[list[float]]]:
-    """Point of application (3) [mm] and force (3) [N] of each bone with a force, by frame; none if the force is 0 or not known."""
+    """Point of application (3) [mm] and force (3) [N] on each bone, by frame. A force that is 0 or unknown has no arrow."""
     found = dict[int, list[list[float]]]()
     for i, number in enumerate(run.numbers):
         if number in numbers and (pull := forces.block(run, setup, i)) is not None:
@@ -174,5 +178,5 @@ def arrows(run: Run, setup: Setup, numbers: tuple[int, ...]) -> list[list[list[f
 
 @np.errstate(invalid="ignore")
 def _top(values: list[Floats]) -> float:
-    """The greatest magnitude that is finite."""
+    """The maximum finite magnitude; 0 without finite values."""
     return max((float(np.abs(one[np.isfinite(one)]).max(initial=0.0)) for one in values), default=0.0)

@@ -1,4 +1,4 @@
-"""Checks of arguments of the Python API, made before any work; each error names its argument."""
+"""Checks of the arguments of the Python API before any work begins; each error names its argument."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,19 +15,19 @@ from fem_reference.scenes.muscles import MusclesCase
 
 
 def check[T](given: object, kind: type[T], place: str, want: str) -> T:
-    """The ``given`` argument; InputError unless it is an instance of ``kind``."""
+    """Return the ``given`` argument. Raises InputError at ``place`` unless it is an instance of ``kind``."""
     if not isinstance(given, kind):
         raise InputError(place, said(given), want)
     return given
 
 
 def check_case(case: object) -> Case:
-    """The ``case``; InputError unless it is a Case."""
+    """Return the ``case``. Raises InputError unless it is a Case."""
     return check(case, Case, "case", "a Case, such as load_case returns")
 
 
 def is_of_body(reference: object, of: object) -> bool:
-    """True for a run of the body ``of``; InputError for a run of another body."""
+    """True if ``reference`` is a run of the body ``of``. Raises InputError if it is a run of another body."""
     if not isinstance(reference, Run) or reference.body is None:
         return False
     if reference.body is not of:
@@ -36,7 +36,7 @@ def is_of_body(reference: object, of: object) -> bool:
 
 
 def check_muscle(name: object, case: object, place: str = "muscle") -> None:
-    """Raise InputError at ``place`` unless ``name`` is one of several muscles of the ``case``, or empty for another case."""
+    """Raise InputError at ``place`` unless ``name`` is a muscle of a ``case`` of several muscles, or empty for any other case."""
     names = [one.name for one in case.muscle] if isinstance(case, MusclesCase) else []
     if name not in (names or [""]):
         got = f'"{name}"' if isinstance(name, str) else said(name)
@@ -44,7 +44,7 @@ def check_muscle(name: object, case: object, place: str = "muscle") -> None:
 
 
 def check_keys(keys: object) -> Sequence[str]:
-    """The ``keys``; InputError unless they are a list of texts."""
+    """Return the ``keys``. Raises InputError unless they are a list of texts."""
     if not isinstance(keys, Sequence) or isinstance(keys, str) or not all(isinstance(key, str) for key in keys):
         raise InputError("fit", said(keys), 'a list of keys, such as ["effect[0].mu"]')
     return keys
@@ -69,7 +69,7 @@ def check_solver(solver: object, settings: Mapping[str, object], muscle: str = "
 
 
 def free_folder(given: object, place: str) -> Path:
-    """The path of a folder that exists or can be made."""
+    """The path ``given`` for a folder. Raises InputError at ``place`` unless the folder exists or can be made."""
     folder = path(given, place)
     above = next(one for one in (folder, *folder.absolute().parents) if one.exists())
     if not above.is_dir():
@@ -78,7 +78,7 @@ def free_folder(given: object, place: str) -> Path:
 
 
 def check_comparison(comparison: object) -> Comparison:
-    """The ``comparison``; InputError unless it is a Comparison."""
+    """Return the ``comparison``. Raises InputError unless it is a Comparison."""
     return check(comparison, Comparison, "comparison", "a Comparison, such as compare returns")
 
 
@@ -93,11 +93,13 @@ def check_error_bars(bars: object, case: Case) -> None:
 
 
 def check_run(given: object, case: Case, place: str) -> None:
-    """Raise InputError unless ``given`` is a run of the kind of the ``case`` (muscle or field) and, if it names a case, of this."""
+    """Raise InputError unless ``given`` is a run of the same kind as the ``case`` (muscle or field). If the run names the case that
+    it solved, this must be the ``case``.
+    """
     run = check(given, Run, place, "a Run, such as solve and read_run return")
     scene, effects, place = run.origin.get("scene"), run.origin.get("effects"), f'{place} "{run.name}"'
     keys = {case.key}
-    if case.decisions and isinstance(effects, Mapping):  # a run in which unneeded effects were left out
+    if case.decisions and isinstance(effects, Mapping):  # effects that were not needed were left out of the run
         acting = tuple(one.effect for one in case.decisions if one.effect.title in effects)
         keys.add(case.model_copy(update={"effect": acting}).key)
     if scene is not None and scene not in keys:
@@ -109,7 +111,7 @@ def check_run(given: object, case: Case, place: str) -> None:
 
 
 def check_runs(reference: Run, candidates: object, case: Case) -> None:
-    """Raise InputError if runs cannot be compared: they are of another case, two have the same name, or the vertices differ."""
+    """Raise InputError if runs cannot be compared because they solve another case, share a name, or differ in their vertices."""
     check_run(reference, case, "reference")
     if not isinstance(candidates, Sequence) or isinstance(candidates, str | bytes):
         raise InputError("candidates", said(candidates), "a list of runs")

@@ -1,4 +1,4 @@
-"""Error bars of bodies: from one further, more accurate solution, of quadratic elements or on cells of half the size."""
+"""Error bars of bodies from one more accurate solution, with quadratic elements or on cells of half the size."""
 
 import logging
 
@@ -19,7 +19,7 @@ _QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
 
 
 def body_bars(solved: Run) -> BodyBars | None:
-    """The error bars of a run by :func:`solve_body`; None if that did not converge."""
+    """The error bars of a run that :func:`solve_body` returned; None if the run did not converge."""
     if solved.outcome.status != "converged":
         log.info("no error bars: the body did not converge")
         return None
@@ -40,9 +40,11 @@ def body_bars(solved: Run) -> BodyBars | None:
 def sharper_problem(
     body: Body, settings: fenicsx.BodySettings
 ) -> tuple[Body, Ints, dict[str, float | str | None], str]:
-    """A more accurate problem: its body, the indices in it of the points of ``body``, changed settings, and changes in words."""
+    """A more accurate problem: the new body, the indices in the new body of the points of ``body``, the changed settings, and a
+    description of the changes.
+    """
     changes, said = dict[str, float | str | None](store_state=False), ""
-    # In all other cases a state does not depend on load steps.
+    # Without friction and without effects that need the step's interval, a state does not depend on load steps.
     if body.rubs or any("interval" in effect.needs for effect in body.effects):
         largest = min(settings.largest_step or np.inf, float(np.diff(body.frames).max(initial=settings.first_step)))
         changes |= {"first_step": settings.first_step / 2, "largest_step": largest / 2}

@@ -1,4 +1,4 @@
-"""Comparisons of several muscles that one reference solves together, with candidates that solve each muscle alone."""
+"""Comparisons for cases of several muscles: the reference solves all muscles together, and candidates solve each muscle alone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,8 +21,10 @@ ALONE = "Each candidate solves each muscle by itself, without the other muscles.
 
 @dataclass(frozen=True, eq=False)
 class ByMuscle:
-    """Comparisons of the ``muscles`` of a case, by name. ``worst``: rows of a solver, two muscles in its run, the greatest depth
-    [mm] of their overlap, and its frame. ``lacking``: pairs of a candidate and a muscle of which it has no frames.
+    """Comparisons of the ``muscles`` of a case, by name of the muscle.
+
+    Each row of ``worst`` contains a solver, the names of two muscles, the maximum depth [mm] to which the solver lets them overlap,
+    and the frame of the maximum. ``lacking``: pairs of a candidate and a muscle of which the candidate has no frames.
     """
 
     muscles: dict[str, Comparison]
@@ -37,9 +39,10 @@ class ByMuscle:
 
 
 def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, error_bars: bool = False) -> ByMuscle:
-    """A comparison for each of several muscles, between its part of the common reference and candidates that solve it alone.
-    Recorded frames are read from folders named after the muscles; a candidate may lack some. With ``error_bars``, bars are
-    computed; else stored ones are used.
+    """Compare, for each of several muscles, its part of the common reference with the candidates that solve this muscle alone.
+
+    Recorded frames are read from folders named after the muscles; a candidate may lack frames of some muscles. With ``error_bars``,
+    error bars are computed; otherwise only stored ones are used.
     """
     parts, found = bench.parts, dict[str, Comparison]()
     chosen = [(bench.found(*one), one[1]) for one in chosen]
@@ -69,13 +72,17 @@ def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, err
 
 
 def split(bench: Bench[Case], reference: Run) -> dict[str, Run]:
-    """The run of each muscle by name, over all frames and with the others as ``others``, from the ``reference`` of all muscles."""
+    """Split the ``reference`` of all muscles into a run for each muscle, by name. Each run covers all frames, and has the other
+    runs as ``others``.
+    """
     numbers = bench.scene.numbers
     return beside({name: complete(run, numbers) for name, run in bench.by_muscle(reference).items()})
 
 
 def of_part(entry: Candidate, place: str, muscle: str) -> Candidate:
-    """A candidate with the folder, if any, of one ``muscle``; InputError at ``place`` if it has no frames of this muscle."""
+    """The candidate ``entry`` for one ``muscle``: recorded frames are read from the folder of this muscle. Raises InputError at
+    ``place`` if there is no such folder.
+    """
     found = _own((entry, place), muscle)
     if found is None:
         want = f'a folder "{muscle}" in it, with the frames of this muscle'
@@ -84,7 +91,9 @@ def of_part(entry: Candidate, place: str, muscle: str) -> Candidate:
 
 
 def _own(chosen: tuple[Candidate, str], name: str) -> tuple[Candidate, str] | None:
-    """A candidate with its place; for recorded frames with the folder of the muscle ``name``, or None if it does not exist."""
+    """A candidate and its place, for the muscle ``name``. Recorded frames are those in the folder of this muscle; None if there is
+    no such folder.
+    """
     entry, place = chosen
     if entry.solver != "recorded":
         return chosen

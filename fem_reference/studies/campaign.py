@@ -1,7 +1,7 @@
-"""Many runs at once: on processes of this machine, or on the workers of a Dask cluster; each run goes into the store.
+"""Many runs at once, in processes of this machine or on the workers of a Dask cluster; each run is stored as soon as it ends.
 
-If a worker dies, only the run that it was solving is lost; another worker solves it again. Stored runs are not solved again, so an
-interrupted campaign continues where it stopped.
+If a worker dies, only the run that it was solving is lost, and another worker repeats it. Stored runs are reused, so an interrupted
+campaign continues where it stopped.
 """
 
 import logging
@@ -26,15 +26,17 @@ log = logging.getLogger(__name__)
 
 # The number of attempts at a run whose worker died.
 ATTEMPTS = 3
-# A run that ended with one of these statuses would do so again; a run that timed out or crashed may succeed.
+# A run that ended with one of these statuses would end the same way again; a run that timed out or crashed may succeed.
 _LASTING = ("diverged", "inverted", "collapsed", "limit point", "out of steps")
 _BENCHES: dict[tuple[str, Path, Path], Bench[MuscleCase]] = {}
 
 
 @dataclass(frozen=True)
 class Workers:
-    """Workers that solve runs: ``count`` processes of this machine, or the workers of the Dask scheduler at ``address``, such as
-    one that dask-jobqueue started on a cluster; all need access to the store. InputError if ``count`` is below one.
+    """Workers that solve runs: ``count`` processes of this machine, or the workers of the Dask scheduler at an ``address``.
+
+    Dask-jobqueue, for example, starts such a scheduler on a cluster. All workers need access to the store. Raises InputError if
+    ``count`` is below one.
     """
 
     count: int = 1
@@ -61,17 +63,17 @@ class Made:
 
     @property
     def reached(self) -> Run | None:
-        """The run, None if it did not reach all frames."""
+        """The run; None if there is no run or it did not reach all frames."""
         return self.run if self.ended[0] == "converged" else None
 
     @property
     def ended(self) -> tuple[str, str]:
-        """Status and message of the run, the status ``"refused"`` if there is none."""
+        """Status and message of the run; ``"refused"`` and the reason if there is no run."""
         return (self.run.outcome.status, self.run.outcome.message) if self.run else ("refused", self.failure)
 
 
 def each[S, T](scenes: Mapping[str, S], of: Callable[[S], T]) -> tuple[dict[str, T], dict[str, str]]:
-    """The results of the function ``of`` by name of the scene, and the InputError of each scene without a result."""
+    """Call the function ``of`` for each of ``scenes``. Return the results by name, and the messages of InputErrors by name."""
     found, missing = dict[str, T](), dict[str, str]()
     for name, scene in scenes.items():
         try:
@@ -83,7 +85,7 @@ def each[S, T](scenes: Mapping[str, S], of: Callable[[S], T]) -> tuple[dict[str,
 
 
 def carry_out(trials: Sequence[Trial], store: Path, workers: Workers) -> tuple[Made, ...]:
-    """The runs of all ``trials``, in their order, from the ``store`` if they are there, else solved now."""
+    """The runs of all ``trials`` in their order, read from the ``store`` or solved now."""
     if workers.count > 1 or workers.address is not None:
         return _in_parallel(trials, store.absolute(), workers)
     made = []
@@ -102,7 +104,7 @@ def spread[S, T](of: Callable[[S], T], items: Sequence[S], workers: Workers) -> 
 
 
 def solve(trial: Trial, store: Path) -> Run:
-    """The run of a trial, solved in this process; a stored run that failed and would fail again is not repeated."""
+    """The run of a trial, from the ``store`` or solved in this process. A failed run that would fail again is not repeated."""
     bench = shared_bench(trial.scene, store)
     folder = bench.folder(trial.choice, trial.name)
     if runs.status(folder) in _LASTING:
@@ -111,7 +113,7 @@ def solve(trial: Trial, store: Path) -> Run:
 
 
 def shared_bench(case: MuscleCase, store: Path) -> Bench[MuscleCase]:
-    """The bench that all runs on a case share in this process, with its tetrahedra; the process keeps two benches."""
+    """The bench, and with it the mesh, that all runs on a case share in this process. The process keeps the last two benches."""
     key = case.key, store, case.folder
     if key not in _BENCHES:
         for old in list(_BENCHES)[:-1]:
@@ -121,7 +123,7 @@ def shared_bench(case: MuscleCase, store: Path) -> Bench[MuscleCase]:
 
 
 def _made(trial: Trial, store: Path) -> Made:
-    """A trial with its result; bad input or a missing package ends only this trial."""
+    """Solve a trial. Invalid input or missing software ends only this trial."""
     try:
         return Made(trial, solve(trial, store))
     except (InputError, MissingSoftware) as error:
@@ -153,7 +155,9 @@ def _in_parallel(trials: Sequence[Trial], store: Path, workers: Workers) -> tupl
 
 
 def _by_worker(trial: Trial, store: Path) -> tuple[Path | None, str]:
-    """The folder of the run of a trial, or the reason why there is none: the main process reads the run from the store."""
+    """Solve a trial in a worker. Return the folder of the run, from which the main process reads it, and the reason if there is no
+    run.
+    """
     found = _made(trial, store)
     return found.run.folder if found.run else None, found.failure
 
@@ -166,12 +170,12 @@ def _loaded(folder: Path, trial: Trial) -> Run:
 def _executor(workers: Workers) -> Iterator[Executor]:
     """Processes of this machine, or the workers of a Dask scheduler, which gives the run of a dead worker to another worker."""
     if workers.address is None:
-        # Spawned processes, as numba, PETSc and locks do not survive a fork.
+        # Processes are spawned, because numba, PETSc and locks do not survive a fork.
         before = set(multiprocessing.active_children())
         with ProcessPoolExecutor(workers.count, mp_context=multiprocessing.get_context("spawn")) as executor:
             try:
                 yield executor
-            except BaseException:  # also an interruption: otherwise the executor would wait for runs in progress
+            except BaseException:  # including an interruption: otherwise the executor would wait for runs in progress
                 for worker in set(multiprocessing.active_children()) - before:
                     worker.terminate()
                 raise

@@ -28,26 +28,28 @@ from fem_reference.studies.variations import TETRAHEDRA, Trial, candidate_trials
 
 log = logging.getLogger(__name__)
 
-# The metrics of every point of the study; the joint moment only if a solver has forces.
+# The metrics of every point of the study; the joint moment is measured only for solvers with forces.
 METRICS = (*in_tables(), "joint_moment")
 # Surface solvers also run on 4**power times as many triangles; these surfaces are stored with the runs.
 _POWERS = (-1, 1)
 _MOST_TRIANGLES = 20_000  # with more triangles a run takes minutes, most of a study's time
 SURFACES = "surfaces"
 FILE = "study.json"
-# The number of the reference's coarser runs, the finest ones, for which claimed error bars are compared with true errors.
+# The number of coarser runs of the reference, starting with the finest, whose error bars are compared with true errors.
 _CLAIMING = 4
 
 
 def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Collection[str] = ()) -> Study:
-    """Study each of ``scenes`` with runs in ``store``, solved if missing; if ``only`` names solvers, with these alone."""
+    """Study each of ``scenes``, and solve runs that are missing in ``store``. If ``only`` names solvers, study only these."""
     cases, missing = each({scene.name: scene for scene in scenes}, lambda case: _of(case, store, workers, only))
     return Study(tuple(cases.values()), missing, made_with(str(workers)))
 
 
 def stored(folder: Path) -> list[CaseStudy]:
-    """The studies below ``folder``, one for each case, preferably from the folder named after the case. Points of other studies
-    against the same truth are added, such as those of a user's own solver. InputError if there is no study.
+    """Read the studies below ``folder``, one for each case, preferably from the folder that is named after the case.
+
+    Points of further studies with the same truth, such as those of a user's own solver, are added. Raises InputError if there is no
+    study.
     """
     known = [(study, path.parent.name) for path in sorted(folder.glob(f"*/{FILE}")) for study in load(path)]
     found = dict[str, CaseStudy]()
@@ -60,7 +62,7 @@ def stored(folder: Path) -> list[CaseStudy]:
 
 
 def _with_points(study: CaseStudy, other: CaseStudy) -> CaseStudy:
-    """A study of a case, plus the points that only the ``other`` one has, if both are against the same known truth."""
+    """The ``study`` of a case with the points that only the ``other`` study has, if both have the same known truth."""
     if not study.truth_key or study.truth_key != other.truth_key:
         return study
     own = {(point.name, str(point.choice)) for point in study.points}
@@ -107,7 +109,7 @@ def _of(case: MuscleCase, store: Path, workers: Workers, only: Collection[str]) 
 
 
 def known(bars: ErrorBars | None) -> dict[str, float]:
-    """The greatest error bar over the frames, for each statistic of a deviation."""
+    """The maximum error bar over frames by ``metric.statistic``, for each statistic of a deviation."""
     if bars is None:
         return {}
     worst = {f"{bar.metric}.{bar.statistic}": bar.worst.value for bar in bars.of_deviations}
@@ -124,7 +126,7 @@ def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
 
 
 def settings_of(trial: Trial) -> dict[str, object]:
-    """Settings of a trial other than the solver's defaults (which are left out even if stated), and the hash of a program."""
+    """The settings of a trial that differ from the defaults of its solver, and the hash of a program."""
     given = trial.choice.settings
     try:
         own = solvers.settings(trial.choice, trial.name)
@@ -137,13 +139,15 @@ def settings_of(trial: Trial) -> dict[str, object]:
 
 
 def greatest(run: Run, truth: Run, context: MeasurementContext, names: Collection[str]) -> dict[str, float]:
-    """For each statistic of the metrics ``names``, the greatest magnitude of its deviation over frames; NaN if any is NaN."""
+    """The maximum magnitude over frames of each deviation of a ``run`` from the ``truth``, by ``metric.statistic``, for the metrics
+    ``names``; NaN if a value is NaN.
+    """
     found = measure(complete(run, truth.numbers), truth, context, names)
     return {f"{one.metric}.{one.statistic}": float(np.abs(one.values).max()) for one in found}
 
 
 def errors(run: Run, truth: Run, context: MeasurementContext) -> dict[str, float]:
-    """The greatest deviations of a ``run`` from the ``truth``; empty for an unfinished run and for the truth itself."""
+    """The maximum deviations of a ``run`` from the ``truth``; empty for an unfinished run and for the truth itself."""
     if run.outcome.status != "converged" or run.folder == truth.folder:
         return {}
     found = greatest(carried(complete(run, truth.numbers), truth.surface), truth, context, METRICS)
@@ -151,16 +155,16 @@ def errors(run: Run, truth: Run, context: MeasurementContext) -> dict[str, float
 
 
 def costs(run: Run) -> dict[str, float]:
-    """Costs of a run: those of ``COSTS`` that are known, and seconds by phase."""
+    """The known costs of a run: those in ``COSTS``, and the seconds of each phase."""
     cost = run.outcome.cost
     seconds = seconds_per_frame(run)
     found = {name: value for name, value in cost.items() if name in (*COSTS, LOAD) or name.startswith("seconds_")}
-    # A program states its time per frame number; from one frame of the scene to the next there may be several numbers.
+    # A program states its time per frame number; there may be several frame numbers between two frames of the scene.
     return found | ({} if seconds is None else {"seconds_per_frame": seconds})
 
 
 def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store: Path) -> tuple[Claim, ...]:
-    """The error bars of the reference on coarser meshes, each with the difference of that run from the truth."""
+    """Claims of error bars for runs of the reference on coarser meshes, with the differences of these runs from the truth."""
     found = list[Claim]()
     on_tetrahedra = [one for one in made if (one.trial.name, one.trial.knob) == ("reference", TETRAHEDRA)]
     members = [(one.trial, run) for one in on_tetrahedra if (run := one.reached) is not None]

@@ -1,11 +1,11 @@
-"""Data set for machine learning: muscles solved, checked and measured, with hashes, splits and metadata, in one folder.
+"""Data set for machine learning: a folder of solved and checked muscles with error bars, hashes, splits and metadata.
 
-dataset.json               version, splits, the SHA-256 of every other file, scenes left out with the reason
+dataset.json               version, splits, the SHA-256 of every other file, and scenes that were left out, with the reason
 datacite.json              metadata in DataCite's schema 4.6
-load.py                    a loader that needs numpy alone
-scenes/NAME/case.toml      the case, as ``fem-reference run scenes/NAME`` solves it, and muscle.ply; neither for shipped cases
+load.py                    a loader that needs only numpy
+scenes/NAME/case.toml      the case, which ``fem-reference run scenes/NAME`` solves, and muscle.ply; neither for shipped cases
            /frames.npz     the arrays of :func:`arrays`
-           /bars.json      error bars of every statistic by frame; doubts, such as a small det F at the rim of an attachment
+           /bars.json      error bars of every statistic in each frame, and doubts, such as a small det F at an attachment's rim
 """
 
 import hashlib
@@ -43,7 +43,7 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# The version, to be raised with any change of scenes or stored arrays: equal version, seed and sizes mean equal scenes.
+# The version must be raised with every change to scenes or stored arrays: equal version, seed and sizes mean equal scenes.
 VERSION = "1.0.0"
 SHIPPED = ("hip_flexion",)  # cases with the project's own geometry, without anatomy under another licence
 INDEX = "dataset.json"
@@ -53,7 +53,9 @@ _SAME = 0.01  # the relative difference of volume and principal moments below wh
 
 @dataclass(frozen=True)
 class Sizes:
-    """The sizes of a data set: ``muscles`` drawn with a ``seed``, the ``poses`` of each besides rest, and ``shipped`` cases."""
+    """The sizes of a data set: the number of ``muscles``, drawn at random with a ``seed``; the number of ``poses`` of each muscle
+    in addition to rest; and the names of ``shipped`` cases.
+    """
 
     muscles: int
     poses: int
@@ -62,14 +64,16 @@ class Sizes:
 
     @property
     def facts(self) -> dict[str, object]:
-        """The identity of the data set, by which a build recognises it in a folder."""
+        """The version, the seed and the sizes, by which :func:`build` recognises the data set in a folder."""
         drawn = {"muscles": self.muscles, "poses": self.poses, "seed": self.seed, "shipped": list(self.shipped)}
         return {"version": VERSION, **drawn}
 
 
 def build(folder: Path, wanted: Sizes, store: Path, workers: Workers) -> dict[str, object]:
-    """Make the data set in a ``folder``, with runs in ``store``, and return its index. An interrupted build continues from the
-    stored runs. InputError if the folder has another data set or other files, or no scene passes.
+    """Make the data set in a ``folder``, with runs in ``store``, and return the index of the data set.
+
+    An interrupted build continues from the stored runs. Raises InputError if the folder contains another data set or other files,
+    or if no scene passes its checks.
     """
     place = folder / INDEX
     if place.exists() and (known := texts.read_json(place, "the index of a data set"))["wanted"] != wanted.facts:
@@ -83,7 +87,7 @@ def build(folder: Path, wanted: Sizes, store: Path, workers: Workers) -> dict[st
     kept = [name for name in names if name not in reasons]
     if not kept:
         raise InputError(folder, f"no scene that passes: {reasons}", "at least one")
-    # A stopped build of other sizes may have left other scenes.
+    # An interrupted build with other sizes may have left scenes behind.
     for other in {path.name for path in (folder / "scenes").iterdir()} - {*kept}:
         shutil.rmtree(folder / "scenes" / other)
     files.write_text(folder / "load.py", Path(dataset_loader.__file__).read_text(encoding="utf-8"))
@@ -98,7 +102,7 @@ def build(folder: Path, wanted: Sizes, store: Path, workers: Workers) -> dict[st
 
 
 def hashes(folder: Path) -> dict[str, str]:
-    """The SHA-256 of every file of the data set by name, except the index and hidden (half-written) files."""
+    """The SHA-256 of every file of the data set by name, except the index, hidden (half-written) files and caches."""
     paths = (one for one in sorted(folder.rglob("*")) if one.is_file() and one.name != INDEX)
     names = ((one.relative_to(folder), one) for one in paths)
     shown = {str(name): one for name, one in names if not any(part.startswith((".", "__")) for part in name.parts)}
@@ -106,7 +110,7 @@ def hashes(folder: Path) -> dict[str, str]:
 
 
 def _scene(folder: Path, wanted: Sizes, store: Path, name: str) -> str:
-    """Make the scene ``name`` of a data set; return the reason if it is left out, after removing its folder, else ""."""
+    """Make the scene ``name`` of a data set and return "". If the scene is left out, remove its folder and return the reason."""
     place = folder / "scenes" / name
     try:
         if name in wanted.shipped:
@@ -135,7 +139,7 @@ def _scene(folder: Path, wanted: Sizes, store: Path, name: str) -> str:
 
 
 def unfit(bench: Bench[MuscleCase], run: Run, bars: error_bars.ErrorBars | None) -> str:
-    """The reason why a ``run`` is not a truth to learn from; empty if it passes all checks."""
+    """The reason why a ``run`` is unfit as training data; empty if the run passes all checks."""
     case = bench.scene
     checks = run.origin.get(RECORD, {}).get("checks", [])
     if run.outcome.status != "converged" or run.numbers != case.numbers:
@@ -147,18 +151,21 @@ def unfit(bench: Bench[MuscleCase], run: Run, bars: error_bars.ErrorBars | None)
         return "no error bar"
     result = compare(case, bench.setup(), run, (), bars)
     own = [one for one in result.verdicts if one.expectation.of == "reference"]
-    # A small det F at the singular rim of an attachment does not make a run unfit: the error bars cover it.
+    # A small det F at the singular rim of an attachment does not make a run unfit, as error bars include its effect.
     others = {key: values for key, values in run.scalars.items() if not key.startswith("min_det_F")}
     said = [f"{one.expectation.metric} {one.word}" for one in own if one.word != "pass"]
     return "; ".join([*doubts(replace(run, scalars=others)), *said]) or ("" if own else "it has no expectations")
 
 
 def arrays(bench: Bench[MuscleCase], run: Run) -> Arrays:
-    """Arrays of a ``run`` by name: ``frames`` (f,), ``poses`` (f, b, 4, 4) of ``bones`` (b,), ``activation`` (f,); at rest
-    ``points`` (n, 3), ``triangles``, ``tet_points`` (k, 3), ``tets``, ``fibre_points`` (m, 3), ``fibre_offsets``, ``fibre`` (t, 3),
-    the direction in each tetrahedron; by frame ``positions`` (f, n, 3), ``fibre_positions`` (f, m, 3), ``tet_positions`` (f, k, 3)
-    [mm], Cauchy ``stress`` (f, t, 3, 3) [MPa] at the centre of each, and ``forces``, ``moments`` (f, b, 3) [N, N mm] on bones,
-    NaN if unknown; ``surface_bar`` (f,) [mm], the error bar of the surface, rms.
+    """Arrays of a ``run`` by name.
+
+    Motion: ``frames`` (f,), ``bones`` (b,), ``poses`` (f, b, 4, 4), ``activation`` (f,). At rest [mm]: the surface's ``points``
+    (n, 3) and ``triangles``, the mesh's ``tet_points`` (k, 3) and ``tets`` (t, 4), ``fibre_points`` (m, 3) and ``fibre_offsets``;
+    ``fibre`` (t, 3) is the fibre direction in each tetrahedron. In each frame [mm]: ``positions`` (f, n, 3), ``fibre_positions``
+    (f, m, 3) and ``tet_positions`` (f, k, 3). Cauchy ``stress`` (f, t, 3, 3) [MPa] is evaluated at the centroids of tetrahedra.
+    ``forces`` and ``moments`` (f, b, 3) [N, N mm] act on bones, and are NaN if unknown. ``surface_bar`` (f,) [mm] is the error bar
+    of the surface's rms deviation.
     """
     assert run.fibres is not None
     assert run.fibre_positions is not None
@@ -185,7 +192,7 @@ def arrays(bench: Bench[MuscleCase], run: Run) -> Arrays:
 
 
 def _inside(run: Run, case: MuscleCase) -> Arrays:
-    """The arrays of the tetrahedra."""
+    """The arrays that describe the tetrahedra at rest and in each frame."""
     assert run.folder is not None  # it is in the store
     mesh, fibre = states.read_rest(run.folder)
     results = Results(mesh, case.effects, states.StoredStates(run.folder, run.numbers), fibre)
@@ -204,8 +211,10 @@ def _inside(run: Run, case: MuscleCase) -> Arrays:
 
 
 def splits(found: dict[str, Arrays], seed: int) -> dict[str, dict[str, dict[str, list[int]]]]:
-    """Rows of frames by scene, for training and for testing. By ``pose``: equal poses of a scene are in the same part, rest in the
-    part for training. By ``shape``: all scenes of the same shape are in the same part.
+    """Rows of frames by scene, for the parts ``train`` and ``test`` of two splits.
+
+    ``pose``: frames of a scene with equal poses are in the same part, and rest is in ``train``. ``shape``: all scenes with the same
+    shape of muscle are in the same part.
     """
     rng, names = np.random.default_rng(seed), list(found)
     parts: dict[str, dict[str, dict[str, list[int]]]] = {key: {"train": {}, "test": {}} for key in ("pose", "shape")}
@@ -223,7 +232,7 @@ def splits(found: dict[str, Arrays], seed: int) -> dict[str, dict[str, dict[str,
 
 
 def _same_poses(one: Arrays) -> Ints:
-    """The group of each frame, 0 for the first; frames of a group have equal poses of all bones and equal activation."""
+    """The group (f,) of each frame, 0 for the first frame. Frames of a group have equal poses of all bones and equal activation."""
     count = len(one["frames"])
     at = np.concatenate([one["poses"].reshape(count, -1), one["activation"].reshape(count, 1)], axis=1).round(6)
     seen: dict[bytes, int] = {}
@@ -231,7 +240,7 @@ def _same_poses(one: Arrays) -> Ints:
 
 
 def _same_shapes(points: Sequence[Floats], triangles: Sequence[Ints]) -> Ints:
-    """The group of each surface; surfaces of a group have equal volume and principal moments, at any position and orientation."""
+    """The group of each surface. Surfaces of a group have equal volumes and principal moments, in any position and orientation."""
     measures = []
     for at, faces in zip(points, triangles, strict=True):
         spread_out = np.linalg.eigvalsh(np.cov((at[faces].mean(axis=1)).T))
@@ -245,7 +254,7 @@ def _same_shapes(points: Sequence[Floats], triangles: Sequence[Ints]) -> Ints:
 
 
 def metadata(wanted: Sizes, scenes: int, frames: int) -> dict[str, object]:
-    """DataCite's metadata (schema 4.6) of a data set, without a DOI, which the publisher adds."""
+    """Metadata of a data set in DataCite's schema 4.6, without a DOI, which the publisher adds."""
     found: dict[str, object] = texts.read_json(Path(__file__).with_name("datacite.json"), "metadata")
     about = f"{frames} states of {scenes} muscles {found.pop('about')}"
     own = {"alternateIdentifier": json.dumps(wanted.facts), "alternateIdentifierType": "version, seed and sizes"}

@@ -1,7 +1,7 @@
-"""The report's estimation techniques (chapter 3) on the fibres, attachments and surface of a case, and their errors.
+"""Errors of the report's estimation techniques (chapter 3) on the fibres, attachments and surface of a case.
 
-The decompositions of a muscle into fibres (report 6.1.2) are also compared with each other: direction, length, points outside,
-crossings, and the result of the reference with each decomposition.
+The decompositions of a muscle into fibres (report 6.1.2) are also compared with each other: their directions, lengths, points
+outside the muscle and crossings, and the result of the reference with each decomposition.
 """
 
 import logging
@@ -44,9 +44,9 @@ CASES = ("hip_flexion", "gluteus_maximus", "gluteus_medius", "iliacus_anatomical
 KNOWN = (4, 6, 10, 20)  # numbers of known points of a fibre
 CENTRES, GAUSSIANS = (4, 9, 16, 25), (10, 30, 100)
 _ALONG = 1000  # the number of sample points of a curve
-_POLYNOMIAL = 3  # the number of terms of a plane
+_POLYNOMIAL = 3  # the number of polynomial terms: those of a plane
 LAPLACE = "Laplace field"
-# The statistics of a result that fibres may change, and the fibre law for a case without one, which is that of hip_flexion.
+# The statistics that may change with the fibres, and the fibre law that a case without one receives: that of hip_flexion.
 ANSWERS = (
     "surface_deviation.rms",
     "surface_deviation.max",
@@ -56,15 +56,15 @@ ANSWERS = (
 )
 PULL = {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
 COUNT, CONTOURS, AROUND = 20, 20, 12
-NEAR = 0.2  # two fibres cross if they are nearer than this [mm] between their ends
-_ENDS = 0.1  # the fraction of a fibre left out at either end, where attachments bring fibres together
-_SAMPLED = 400  # sample points of a fibre
-_SAMPLES = 20_000  # random points in the box around a muscle
-_OUTSIDE = 1e-3  # a point is outside the surface beyond this distance [mm]
+NEAR = 0.2  # [mm]: two fibres cross if they come nearer than this to each other away from their ends
+_ENDS = 0.1  # the fraction of a fibre that is left out at either end, where attachments bring fibres together
+_SAMPLED = 400  # the number of sample points of a fibre
+_SAMPLES = 20_000  # the number of random points in the box around a muscle
+_OUTSIDE = 1e-3  # [mm]: a point counts as outside the surface beyond this distance
 
 
 def estimate(cases: Iterable[MuscleCase], store: Path | None = None) -> Estimation:
-    """All techniques on all cases; with a ``store``, also the results of the reference with each decomposition."""
+    """Apply all techniques to all cases; with a ``store``, also solve the reference with each decomposition into fibres."""
     named = {case.name: case for case in cases}
     setups, missing = each(named, muscle.setup)
     curves, heights, fits = list[CurveError](), list[HeightError](), list[FitError]()
@@ -84,7 +84,7 @@ def estimate(cases: Iterable[MuscleCase], store: Path | None = None) -> Estimati
 
 
 def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:
-    """Errors of each technique on all fibres, by the number of known points, which leaves at least two points to compare with."""
+    """Errors of each technique over all fibres, for each number of known points that leaves two or more others on every fibre."""
     lines = [fibres.points[low:high] for low, high in pairwise(fibres.offsets)]
     for known in (count for count in KNOWN if all(len(line) >= count + 2 for line in lines)):
         for technique, (make, _) in TECHNIQUES.items():
@@ -93,18 +93,20 @@ def of_fibres(case: str, fibres: Polylines) -> Iterator[CurveError]:
 
 
 def _off(line: Floats, count: int, make: Callable[[Floats], Curve]) -> Floats:
-    """Distances (k,) [mm] of points of a ``line`` (n, 3) from the curve by ``make`` through ``count`` evenly spread others."""
+    """Distances (k,) [mm] between a curve and those points of a ``line`` (n, 3) that the curve does not use. The curve is made by
+    ``make`` from ``count`` evenly spread points of the line.
+    """
     known = np.rint(np.linspace(0, len(line) - 1, count)).astype(np.int64)
     away, _ = cKDTree(make(line[known])(np.linspace(0, 1, _ALONG))).query(np.delete(line, known, axis=0))
     return np.asarray(away)
 
 
 def of_attachments(case: str, setup: Setup) -> Iterator[HeightError]:
-    """Errors of each choice of centres on each attached area with enough vertices."""
+    """Errors of height functions with each choice of centres, on each attached area with enough vertices."""
     for entry in setup.attached:
         flat = _flat(setup.surface.points[entry.vertices])
         for count in (count for count in CENTRES if 2 * count <= len(flat[::2])):
-            # Lengths in radii of the Gaussians, so that condition numbers do not depend on the unit of length.
+            # Lengths are in radii of the Gaussians, so that condition numbers do not depend on the unit of length.
             places, heights = flat[:, :2] * np.sqrt(count) / float(np.ptp(flat[:, 0])), flat[:, 2]
             known, asked = places[::2], places[1::2]
             for choice, centres in _centres(known, heights[::2], count):
@@ -114,8 +116,10 @@ def of_attachments(case: str, setup: Setup) -> Iterator[HeightError]:
 
 
 def _flat(points: Floats) -> Floats:
-    """Points (n, 3) of an area relative to their mean, in its principal axes, the last across it, sorted along the first. The
-    result does not depend on the axes of the scene or the order of the points: third moments along the axes are positive.
+    """Points (n, 3) of an area relative to their mean, in the principal axes of the area (the last is normal to it), and sorted
+    along the first axis.
+
+    The result does not depend on the axes of the scene or the order of the points, as third moments along the axes are positive.
     """
     away = points - points.mean(axis=0)
     flat = away @ np.linalg.svd(away, full_matrices=False)[2].T
@@ -124,7 +128,7 @@ def _flat(points: Floats) -> Floats:
 
 
 def _centres(points: Floats, heights: Floats, count: int) -> Iterator[tuple[str, Floats]]:
-    """The centres (count, 2) by each choice of the report's section 3.5.1."""
+    """The name and the centres (count, 2) of each choice of the report's section 3.5.1."""
     yield "grid", radial_basis.grid_centres(points, count)
     yield "Halton", radial_basis.halton_centres(points, count)
     yield "greedy", radial_basis.greedy_centres(points, heights, count, 1.0, terms=_POLYNOMIAL)
@@ -132,7 +136,7 @@ def _centres(points: Floats, heights: Floats, count: int) -> Iterator[tuple[str,
 
 
 def of_surface(case: str, setup: Setup) -> Iterator[FitError]:
-    """Errors of the muscle's surface fitted by Gaussians."""
+    """Errors of the muscle's surface fitted by different numbers of Gaussians."""
     surface = setup.surface
     for count in GAUSSIANS:
         found = fit(surface, count).project(surface.points)
@@ -142,7 +146,7 @@ def of_surface(case: str, setup: Setup) -> Iterator[FitError]:
 
 
 def of_rods(case: str, surface: Surface, fibres: Polylines) -> RodError:
-    """Errors of rods along ``fibres``, at random points of the box around them and the muscle."""
+    """Errors of rods along ``fibres`` as a model of the muscle's volume, at random points of the box around rods and muscle."""
     volume = enclosed_volume(surface.points, surface.triangles)
     radius = float(np.sqrt(volume / (np.pi * fibres.lengths().sum())))
     lines = np.concatenate([_along(fibres.points[low:high]) for low, high in pairwise(fibres.offsets)])
@@ -157,7 +161,7 @@ def of_rods(case: str, surface: Surface, fibres: Polylines) -> RodError:
 
 
 def of_decompositions(case: MuscleCase, rest: Setup) -> Iterator[DecompositionError]:
-    """Each source of fibres of a case compared with the Laplace field and, if it has any, with fibres from a file."""
+    """Differences of each source of fibres from the Laplace field and, if the case has fibres in a file, from those fibres."""
     found = {
         name: anatomy.lines_of(one, rest.surface, partial(muscle.filled, one, rest))[0]
         for name, one in variants(case).items()
@@ -168,10 +172,11 @@ def of_decompositions(case: MuscleCase, rest: Setup) -> Iterator[DecompositionEr
 
 
 def answers(case: MuscleCase, store: Path) -> Iterator[AnswerChange]:
-    """Differences of the reference's result with each source of fibres of a case from its result with the Laplace field, and error
-    bars of the latter. Fibre lengths are those of the lines of the Laplace field, carried by each surface.
+    """Changes of the reference's result if the fibres of the Laplace field are replaced by those of each other source, with the
+    error bars of the result for the Laplace field. Fibre lengths are always those of the lines of the Laplace field, carried along
+    by each surface.
     """
-    # Without candidates, which other fibres may not suit.
+    # Candidates are removed, as other fibres may not suit them.
     alone = case.model_copy(update={"candidate": ()})
     if not any("fibre" in one.needs for one in case.effects):
         alone = alone.model_copy(update={"effect": (*case.effects, effects.make("fibre_passive", **PULL))})
@@ -211,7 +216,7 @@ def variants(case: MuscleCase) -> dict[str, MuscleCase]:
 def compared(
     case: str, surface: Surface, one: tuple[str, Polylines], other: tuple[str, Polylines]
 ) -> DecompositionError:
-    """The differences of named fibres ``one`` from the ``other`` in the ``surface`` of a muscle."""
+    """Compare fibres ``one`` with the fibres ``other`` inside the ``surface`` of a muscle; both come with their names."""
     (source, lines), (against, known) = one, other
     middles, along = NearestLine(known).segments
     directions = NearestLine(lines)(np.zeros(len(middles), np.int64), middles)
@@ -227,7 +232,7 @@ def compared(
 
 
 def crossings(lines: Polylines) -> int:
-    """The number of pairs of lines nearer than ``NEAR`` to each other between their ends."""
+    """The number of pairs of lines that come nearer than ``NEAR`` to each other away from their ends."""
     inner = [_along(lines.points[low:high], _ENDS) for low, high in pairwise(lines.offsets)]
     numbers: Ints = np.repeat(np.arange(len(inner)), _SAMPLED)
     near = cKDTree(np.concatenate(inner)).query_pairs(NEAR, output_type="ndarray")

@@ -1,4 +1,4 @@
-"""The run of a case by a solver: from the store if it was solved before, else solved now and stored."""
+"""Runs of a case by a solver: read from the store if they were solved before, otherwise solved now and stored."""
 
 import logging
 import math
@@ -40,7 +40,7 @@ log = logging.getLogger(__name__)
 
 
 class Bench[C: Case]:
-    """A case with its set-up and its problem, each made once, when first needed, and the store of its runs."""
+    """A case with its set-up, its problem and the store of its runs. Set-up and problem are made once, when first needed."""
 
     def __init__(self, scene: C, store: Path, ranks: int | None = None, time_limit: float = math.inf) -> None:
         self._setup: Callable[[], CaseSetup] = made_once(lambda: of_case.setup(scene))
@@ -49,14 +49,14 @@ class Bench[C: Case]:
         self._begin()
 
     def _begin(self) -> None:
-        """Reset everything that depends on the effects that act, so that it is made again when needed."""
+        """Reset the problem and the watch, which depend on the acting effects, so that both are made again when needed."""
         self._problem: Callable[[], CaseProblem] = made_once(lambda: of_case.problem(self.scene, self._setup()))
         # The watch for effects that the case left out but that turn out to matter; None if it left out none.
         self.watch: Callable[[], Watch | None] = cache(lambda: of_case.watch(self.scene, self._setup(), self._problem))
 
     @property
     def scene(self) -> C:
-        """The case, with the effects that it needs."""
+        """The case with its acting effects, including those that turned out to matter."""
         return self._scene
 
     @overload
@@ -72,23 +72,27 @@ class Bench[C: Case]:
     @overload
     def problem(self) -> CaseProblem: ...
     def problem(self) -> CaseProblem:
-        """The problem of the case, meshed."""
+        """The problem of the case, with its mesh."""
         return self._problem()
 
     def of_muscle(self) -> "Bench[MuscleCase]":
-        """This bench, if its case is that of a single muscle; else InputError."""
+        """This bench, as the bench of a single muscle. Raises InputError if the case is not that of a single muscle."""
         casefile.muscle(self.scene)
         return cast("Bench[MuscleCase]", self)
 
     def found[S: SolverChoice](self, choice: S, place: str) -> S:
-        """The ``choice`` with its folder, if any, as a path; a folder named in the scene must be one that the scene may read."""
+        """The ``choice`` with its setting ``folder``, if it has one, as a complete path.
+
+        A relative folder, or one that the scene itself names, must be a folder that the scene may read. ``place``: the key of the
+        choice in the scene.
+        """
         folder, named = choice.settings.get("folder"), choice in (self.scene.reference, *self.scene.candidate)
         if not isinstance(folder, str) or not (named or not Path(folder).is_absolute()):
             return choice
         return choice.model_copy(update={"folder": str(self.scene.file(folder, f"{place}.folder"))})
 
     def settings(self, choice: SolverChoice, place: str) -> Record:
-        """The settings of ``choice``, checked."""
+        """The settings of ``choice``, checked against the case; ``place`` is the key of the scene that chooses the solver."""
         choice = self.found(choice, place)
         where, task = join(self.scene.place, place), self.scene.task
         settings = solvers.settings(choice, where, task)
@@ -111,16 +115,18 @@ class Bench[C: Case]:
         return made
 
     def by_muscle(self, run: Run) -> dict[str, Run]:
-        """The ``run`` of several muscles split into one for each, by name."""
+        """The ``run`` of several muscles, split into one run for each muscle, by name."""
         problem, parts = self.problem(), self.parts
         assert isinstance(problem, MusclesProblem)
         found = {name: run_of(run, problem, name) for name in parts}
         return {name: replace(one, origin=one.origin | {"scene": parts[name].scene.key}) for name, one in found.items()}
 
     def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
-        """Raise InputError if settings do not suit the case: those of the reference, of a candidate of the case (except recorded
-        frames, which may come later) or of the ``chosen`` solvers. The problem of the case, and before it the frames of chosen
-        candidates, are checked only if something has to be solved.
+        """Raise InputError if the settings of a solver do not suit the case.
+
+        The settings of the reference, of the ``chosen`` solvers and of the candidates of the case are checked, except candidates
+        with recorded frames, which may not exist yet. Only if a run has to be solved, the recorded frames of chosen candidates
+        are read and the problem is checked.
         """
         if self.scene.parts:
             self.settings(self.scene.reference, "reference")
@@ -142,9 +148,12 @@ class Bench[C: Case]:
                 offer.check_problem(own, self.given(offer, own), join(self.scene.place, place))
 
     def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
-        """The run of a solver, stored or solved now. ``name``: its name on pages; ``place``: the scene's key that chooses it."""
+        """The run of a solver, from the store or solved now.
+
+        ``name``: the name of the run on pages; ``place``: the key of the scene that chooses the solver.
+        """
         run = self._run(name, choice, place, self._made)
-        assert run is not None  # a run that is not stored is made
+        assert run is not None  # a run that is not stored is solved
         return run
 
     def reference(self) -> Run:
@@ -152,7 +161,9 @@ class Bench[C: Case]:
         return self.obtain("reference", self.scene.reference, "reference")
 
     def runs(self, chosen: Sequence[tuple[Candidate, str]]) -> tuple[Run, ...]:
-        """The runs of the reference and the ``chosen`` candidates, each with its place; recorded frames are read before solving."""
+        """The runs of the reference and of the ``chosen`` candidates. Each candidate comes with its key in the scene. Recorded
+        frames are read before anything is solved.
+        """
         read = {one.name: self.read(one.name, one, place) for one, place in chosen if one.solver == "recorded"}
         reference = self.reference()
         return (reference, *(read.get(one.name) or self.obtain(one.name, one, place) for one, place in chosen))
@@ -164,7 +175,7 @@ class Bench[C: Case]:
         return other._run(name, choice, place, lambda _: None)
 
     def _run(self, name: str, choice: SolverChoice, place: str, make: Callable[[Wanted], Run | None]) -> Run | None:
-        """The stored run, or the one that ``make`` returns, with all effects that turn out to matter."""
+        """The stored run or, without one, the run from ``make``; repeated with all effects that turn out to matter."""
         if choice.solver == "recorded":  # read each time, as files may change under the same name
             return self.read(name, choice, place)
         offer = solvers.find(choice.solver, place, self.scene.task)
@@ -187,7 +198,7 @@ class Bench[C: Case]:
         return None if run is None else self._checked(run)
 
     def _made(self, wanted: Wanted) -> Run:
-        """The run, solved now, by one process at a time; errors in the input are raised before anything is written."""
+        """Solve a run under a lock, so that only one process solves it; invalid input is reported before anything is written."""
         wanted.offer.require(wanted.settings)
         if self.scene.parts and wanted.choice.solver != "fenicsx":
             got = f'"{wanted.choice.solver}" for several muscles'
@@ -211,7 +222,7 @@ class Bench[C: Case]:
         return ("converged", "denied", *(("stopped",) if self._watched(solver) else ()))
 
     def _checked(self, run: Run) -> Run:
-        """The ``run``, with its second check (stored with it) if a solver that models effects solved a muscle."""
+        """The ``run``, with a second check (stored with the run) if a solver that models effects solved muscles."""
         asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
         if not asked or run.outcome.status not in ("converged", "denied"):
             return run
@@ -222,7 +233,7 @@ class Bench[C: Case]:
         return self.watch() if solvers.takes_effects(solver) else None
 
     def _turned_out(self, run: Run) -> tuple[Decision, ...]:
-        """The effects that the case left out but that matter in a stored ``run``, as found at the first frame that shows any."""
+        """Effects that the case left out but that matter in a stored ``run``: those at the first frame that reveals any."""
         watch = self._watched(run.solver)
         if watch is None or run.origin.get("watched") == watch.names:
             return ()
@@ -230,7 +241,7 @@ class Bench[C: Case]:
         return next(filter(None, making.seen(watch, run.folder, run.numbers)), ()) or watch.end()
 
     def _solved(self, wanted: Wanted, given: CaseSetup) -> Run:
-        """The run of the problem ``given`` to the solver, written into its folder frame by frame."""
+        """Solve ``given`` (the problem or the set-up), and write the run into its folder frame by frame."""
         solver = wanted.choice.solver
         origin = self.origin(solver, wanted.settings)
         if wanted.offer.fills(wanted.settings):
@@ -253,7 +264,7 @@ class Bench[C: Case]:
         return cast("CaseSetup", self._problem()) if offer.fills(settings) else self._setup()
 
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
-        """A recorded run, checked against the set-up of the scene; it is read each time and never stored."""
+        """Read recorded frames as a run, and check them against the set-up of the scene; the run is never stored."""
         if self.scene.parts:
             raise InputError(place, "frames of several muscles", "frames of each muscle, in a folder with its name")
         wanted, frames = self.settings(choice, place), list[Frame]()
@@ -264,16 +275,16 @@ class Bench[C: Case]:
         return replace(run, name=name, solver=choice.solver, origin=origin, states=())
 
     def folder(self, choice: SolverChoice, place: str) -> Path:
-        """The folder of the stored run of a solver of this package; it exists once the run is made."""
+        """The folder of a solver's stored run; the folder does not exist before the run is made."""
         return self.store / f"{choice.solver}-{self.key(choice.solver, self.settings(choice, place))}"
 
     def key(self, solver: str, settings: Record) -> str:
-        """The key of a run: a hash over all that determines it."""
+        """The key of a run: a hash of everything that determines its result."""
         numerics = {name: value for name, value in settings.model_dump(mode="json").items() if name not in MACHINE_ONLY}
         return key(self.scene.key, solver, numerics)
 
     def origin(self, solver: str, settings: Record) -> dict[str, object]:
-        """Provenance of a run, with all that is needed to reproduce it."""
+        """Provenance of a run, with everything that is needed to reproduce it."""
         acting = self.scene.acting if self.scene.task != "solve" or solvers.takes_effects(solver) else {}
         return {
             "case": self.scene.name,

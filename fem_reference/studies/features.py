@@ -1,4 +1,4 @@
-"""Numbers known about a case before it is solved: features, by which cases are compared, and the cost of its reference."""
+"""Quantities known before a case is solved: features, by which cases are compared, and the expected cost of the reference."""
 
 import math
 from collections.abc import Iterable
@@ -18,16 +18,17 @@ from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
-# Measured on hip_flexion: processor time [s] of a Newton iteration with this number of unknowns, the exponent with which it grows,
-# and iterations per frame.
+# Measured on hip_flexion: processor time [s] of a Newton iteration with this number of unknowns, the exponent with which the time
+# grows with that number, and iterations per frame.
 _SECONDS, _UNKNOWNS, _EXPONENT, _ITERATIONS = 0.13, 5456, 1.15, 4
-# With contact between parts: iterations for a motion of the attachments by the edge of a facet, which bounds the load steps (12 in
-# two_muscles, 23 with its larger tetrahedra, 31 in hip_four_muscles), and the additional processor time [s] of an iteration.
+# With contact between parts: the number of iterations for each motion of the attachments by the length of a facet's edge, which
+# limits the load steps (12 in two_muscles, 23 on larger tetrahedra, 31 in hip_four_muscles); and the additional processor time [s]
+# of an iteration.
 _PER_EDGE, _CONTACT = 15, 0.1
 
 
 class ExpectedCost(NamedTuple):
-    """The size of a problem, the processor time [s] that FEniCSx takes for it, within a factor of three, and its memory [MB]."""
+    """The number of ``unknowns`` of a problem, and the processor time [s], within a factor of three, and memory [MB] of FEniCSx."""
 
     unknowns: int
     seconds: float
@@ -35,7 +36,7 @@ class ExpectedCost(NamedTuple):
 
 
 def expected(body: Body, settings: Record) -> ExpectedCost:
-    """The expected cost of a muscle as a ``body``, solved by FEniCSx with these ``settings``."""
+    """The expected cost of solving a muscle as a ``body`` by FEniCSx with these ``settings``."""
     assert isinstance(settings, BodySettings)  # the settings of FEniCSx
     count = resources.unknowns(body.mesh, settings.element)
     chosen = resources.planned(settings, body.mesh, math.inf)
@@ -48,13 +49,13 @@ def expected(body: Body, settings: Record) -> ExpectedCost:
 
 
 def _edge(mesh: Cells, regions: Iterable[str]) -> float:
-    """The mean length [mm] of one edge of each facet of the ``regions``."""
+    """The mean length [mm] of the edges of facets in ``regions``, from one edge of each facet."""
     ends = np.concatenate([mesh.points[mesh.facets[name][:, :2]] for name in regions])
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
 
 
 def _travel(body: Body) -> float:
-    """The greatest path [mm] of a point with a prescribed displacement, in straight lines from frame to frame."""
+    """The length [mm] of the longest path of a point with a prescribed displacement, straight from each frame to the next."""
     paths = [0.0]
     for entry in body.prescribed:
         points = (
@@ -66,9 +67,12 @@ def _travel(body: Body) -> float:
 
 
 def features(case: MuscleCase, setup: Setup) -> dict[str, float]:
-    """``size`` [mm], the diagonal of the muscle's box; ``triangles``; ``motion`` [mm], the greatest displacement of an
-    attached vertex over the frames; ``contact``, the number of bones in contact; ``bulk_to_shear`` and ``fibres_to_shear`` of the
-    material without its regions, 0 if it has none; ``tet_size`` [mm] and ``refinements`` of the reference.
+    """Features of a case by name.
+
+    ``size`` [mm]: the diagonal of the muscle's bounding box. ``triangles``: the number of triangles. ``motion`` [mm]: the maximum
+    displacement of an attached vertex over frames. ``contact``: the number of bones with contact. ``bulk_to_shear`` and
+    ``fibres_to_shear``: ratios of moduli outside regions, 0 without a shear modulus. ``tet_size`` [mm] and ``refinements``: those
+    of the reference.
     """
     points = setup.surface.points
     moved = [

@@ -16,7 +16,7 @@ _WANT = "an undamaged folder or archive (zip, tar) with published data"
 
 
 class Listed(Record):
-    """Size [bytes] and SHA-256 of files by their path below the data folder: as ``published``, or ``made`` from published files."""
+    """Size [bytes] and SHA-256 of files by path below the data folder: ``published`` files, and files ``made`` from these."""
 
     licence: str
     published: dict[str, tuple[int, str]]
@@ -29,8 +29,10 @@ def known() -> Listed:
 
 
 def fetch(sources: Sequence[Path], folder: Path, wanted: Listed) -> list[str]:
-    """Write each file of ``wanted`` that a source, a folder or an archive, contains into a new ``folder``, and return their paths
-    below it. Names in a source are ignored. InputError and no folder if none is found, a source is damaged or ``folder`` is in use.
+    """Write each file of ``wanted`` that the ``sources`` contain into a new ``folder``; return the paths of these files below it.
+
+    A source is a folder or an archive; names of files in it are ignored. If no file is found, a source is damaged or ``folder`` is
+    in use, InputError is raised and no folder is made.
     """
     found, files = set[str](), wanted.published | wanted.made
     sizes = {size for size, _ in files.values()}
@@ -47,18 +49,18 @@ def fetch(sources: Sequence[Path], folder: Path, wanted: Listed) -> list[str]:
 
 
 def cases_with(found: Collection[str]) -> list[str]:
-    """The shipped cases that need data, if all of it is among the files ``found``."""
+    """The shipped cases that need data and whose files are all among ``found``."""
     needs = {name: casefile.read(name).needed_data for name in casefile.cases()}
     return [name for name, needed in needs.items() if needed and {*needed} <= {*found}]
 
 
 def _contents(source: Path, sizes: Collection[int]) -> Iterator[bytes]:
-    """The content of each file of a folder or an archive that has one of ``sizes`` [bytes]."""
+    """The contents of the files in a folder or an archive whose size is one of ``sizes`` [bytes]."""
     try:
         if source.is_dir():
             paths = [path for path in source.rglob("*") if path.is_file() and path.stat().st_size in sizes]
             yield from (path.read_bytes() for path in paths)
-        elif texts.is_file(source) and tarfile.is_tarfile(source):  # before zip, as the last file in a tar may be a zip
+        elif texts.is_file(source) and tarfile.is_tarfile(source):  # before zip, as a tar may end with a zip
             with tarfile.open(source) as tar:
                 members = (tar.extractfile(one) for one in tar if one.isfile() and one.size in sizes)
                 yield from (member.read() for member in members if member)

@@ -27,7 +27,7 @@ from fem_reference.studies.execution import Bench
 log = logging.getLogger(__name__)
 
 
-_REFINEMENTS = {2: 5, 3: 3}  # the number of refinements, by the number of vertices of a cell
+_REFINEMENTS = {2: 5, 3: 3}  # the maximum number of refinements, by the number of vertices of a cell
 _MOST_CELLS = 100_000
 _EXACT = 1e-9  # errors below this fraction of the solution are rounding, and show no order
 
@@ -35,7 +35,7 @@ _EXACT = 1e-9  # errors below this fraction of the solution are rounding, and sh
 def compare(
     bench: Bench[Case], reference: Run, candidates: Iterable[Run], error_bars: ErrorBars | None = None
 ) -> Comparison:
-    """Measure and judge the runs of the case of a ``bench`` over all its frames, with the convergence of its reference."""
+    """Measure and judge runs of the case of a ``bench`` over all frames of the case; for a scalar case, add the convergence."""
     case, setup = bench.scene, bench.setup()
     if case.parts:
         raise InputError(
@@ -47,7 +47,7 @@ def compare(
 
 
 def ladders(problem: CaseSetup, case: Case) -> tuple[Convergence, ...]:
-    """The convergence of the reference of a scalar ``case`` with elements of order 1 and 2, if its mesh can be refined."""
+    """The convergence of the reference of a scalar ``case`` with elements of order 1 and 2; empty if the mesh cannot be refined."""
     return () if problem.field is None else tuple(_ladders(problem.field, of_case.scalar_case(case)))
 
 
@@ -72,13 +72,13 @@ def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Convergence]:
     def error(built: FieldProblem, values: Floats) -> float:
         if exact is not None:
             return l2_distance(built.mesh, values, partial(scalar.at, exact))
-        # The vertices of a mesh come first in every finer mesh. All vertices of this mesh count: those of an irregular coarsest
-        # mesh alone would converge with h^2 log h, not with h^2.
+        # The vertices of a mesh come first in every finer mesh. The error is taken over all vertices of this mesh: at those of an
+        # irregular coarsest mesh alone it would converge with h^2 log h, not with h^2.
         count = len(built.mesh.points)
         return float(np.sqrt(np.mean((values[:count] - truth[:count]) ** 2)))
 
     for order in (1, 2):
-        # Without an exact solution, the finest solution of order 2 is the truth for the others.
+        # Without an exact solution, the finest solution of order 2 is the truth for all other solutions.
         finest = levels if order == 1 or case.exact is not None else levels - 1
         steps = [solved(order, level) for level in range(finest + 1)]
         errors = tuple(error(*step) for step in steps)

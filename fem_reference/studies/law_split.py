@@ -1,6 +1,7 @@
-"""The error of a solver with tetrahedra as a sum of parts: effects left out, its law, its mesh and its convergence.
+"""Split of the error of a solver with tetrahedra into parts due to effects left out, its law, its mesh and its convergence.
 
-Intermediate references each change one part: without the effects, then in the solver's law, then on its linear tetrahedra.
+Each intermediate reference changes one more thing: first the effects are left out, then the solver's law is used, then its linear
+tetrahedra.
 """
 
 import math
@@ -22,14 +23,14 @@ from fem_reference.studies.execution import Bench
 LAW = ("neo_hooke", "incompressible", "incompressible_penalty", "mooney_rivlin")
 PARTS = ("left out", "law", "mesh", "convergence")
 # The shear modulus, as a fraction of the bulk modulus, that is added to a law without shear stiffness at rest, whose equilibrium is
-# not unique. It moves the end of a bar that turns by 1 rad by 0.02 mm; with a tenth of it, Newton's method may not converge.
+# not unique. It moves the end of a bar that rotates by 1 rad by 0.02 mm; with a tenth of it, Newton's method may not converge.
 _WEAK = 1e-4
 
 
 @dataclass(frozen=True)
 class Split:
-    """The ``parts`` of an error and the ``total`` (``surface_deviation.rms``), root mean squares [mm] over the surface at the
-    ``frame`` at which the total is greatest; the sum of the parts is at least the total.
+    """The ``parts`` of an error and its ``total`` (``surface_deviation.rms``), as root mean squares [mm] over the surface at the
+    ``frame`` with the maximum total. The sum of the parts is at least the total.
     """
 
     frame: int
@@ -38,8 +39,9 @@ class Split:
 
 
 def lame(case: MuscleCase, poisson: float) -> tuple[float, float]:
-    """Lame's parameters mu and lambda [MPa] of the matrix of a ``case``, with a Poisson's ratio of at most ``poisson``; InputError
-    if it has no such law, or laws of regions.
+    """Lame's parameters mu and lambda [MPa] of the matrix material of a ``case``, with a Poisson's ratio of at most ``poisson``.
+
+    Raises InputError if the matrix has no law in ``LAW`` with a shear and a bulk modulus, or if the case has laws of regions.
     """
     found = moduli([one for one in case.effects if name_of(one) in LAW])
     if (found.shear, found.bulk) != (moduli(case.effects).shear, moduli(case.effects).bulk):
@@ -52,8 +54,9 @@ def lame(case: MuscleCase, poisson: float) -> tuple[float, float]:
 
 
 def split(bench: Bench[MuscleCase], run: Run, law: Effect, takes: Collection[str] = ()) -> Split:
-    """The parts of the error of a ``run`` by a solver with a ``law`` on linear tetrahedra of the case, without springs; ``takes``:
-    the other effects that it models. InputError if an intermediate reference has no solution.
+    """Split the error of a ``run`` into parts. The solver has a ``law``, linear tetrahedra of the case and exact attachments.
+
+    ``takes``: other effects that the solver models. Raises InputError if an intermediate reference has no solution.
     """
     path = [bench.reference(), *_references(bench, law, takes), run]
     frames = np.isfinite(run.positions).all(axis=(1, 2))
@@ -64,7 +67,7 @@ def split(bench: Bench[MuscleCase], run: Run, law: Effect, takes: Collection[str
 
 
 def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -> Iterator[Run]:
-    """References without the effects that the solver leaves out; then also with its law; then also on linear tetrahedra."""
+    """The intermediate references: without the effects that the solver leaves out, then with its law, then on linear tetrahedra."""
     case = bench.scene
     others = [one for one in case.effects if name_of(one) in takes]
     _check_held(bench)
@@ -88,8 +91,8 @@ def _references(bench: Bench[MuscleCase], law: Effect, takes: Collection[str]) -
 
 
 def _check_held(bench: Bench[MuscleCase]) -> None:
-    """Raise InputError if exact attachments would differ too much from the case: it has none, or springs whose stiffness times the
-    size of the muscle is below the shear modulus of the muscle.
+    """Raise InputError if exact attachments would change the case too much: if it has no attachments, or springs whose stiffness
+    times the size of the muscle is below the shear modulus of the muscle.
     """
     case, size = bench.scene, diagonal(bench.setup().surface.points)
     soft = [one.name for one in case.attachment if (one.stiffness or math.inf) * size < moduli(case.effects).shear]
@@ -104,13 +107,13 @@ def _apart(one: Run, other: Run, i: int) -> float:
 
 
 def law_of(name: str, case: MuscleCase, poisson: float) -> Effect:
-    """The effect ``name`` with the parameters of the matrix of a ``case``."""
+    """The law ``name`` with the parameters of the matrix material of a ``case``."""
     mu, second = lame(case, poisson)
     return make(name, mu=mu, lame=second)
 
 
 def check_law(name: str, poisson: object, place: str) -> None:
-    """Raise InputError at ``place`` if the reference has no such law with Lame's parameters, or ``poisson`` is invalid."""
+    """Raise InputError at ``place`` if the reference has no law ``name`` with Lame's parameters, or if ``poisson`` is invalid."""
     known = [one for one in names(Energy) if {"mu", "lame"} <= find(one).model_fields.keys()]
     if name not in known:
         raise InputError(

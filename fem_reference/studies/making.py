@@ -1,4 +1,4 @@
-"""The making of a run: its folder is locked, frames are stored as they are reached, and omitted effects are watched."""
+"""Functions that make a run: they lock its folder, store frames as they are reached, and watch for omitted effects that matter."""
 
 import logging
 import math
@@ -47,7 +47,7 @@ class Wanted:
     folder: Path
 
     def stored(self, ended: tuple[str, ...]) -> Run | None:
-        """The stored run, if its status is in ``ended``; None if it was made with other packages or lacks requested states."""
+        """The stored run, if its status is in ``ended``; None if other package versions made it or it lacks requested states."""
         run = store.finished(self.folder, ended)
         if run is None:
             return None
@@ -65,7 +65,7 @@ class Wanted:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """A context in which only this process makes the run in ``folder``: a second process waits, and then finds it stored."""
+    """A context in which only this process makes the run in ``folder``. A second process waits, and then finds the stored run."""
     files.make_folder(folder.parent)
     lock = FileLock(folder.parent / f".{folder.name}.lock")
     try:
@@ -79,7 +79,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def bars_kept(folder: Path) -> Iterator[None]:
-    """A context that keeps the error bars of a run if the same packages solve it again for its states."""
+    """A context that preserves the error bars of a run when the same package versions solve it again to store its states."""
     before = store.finished(folder)
     same = before is not None and before.origin.get("versions") == versions()
     bars = {path: path.read_text(encoding="utf-8") for path in folder.rglob(error_bars.FILE)} if same else {}
@@ -90,7 +90,7 @@ def bars_kept(folder: Path) -> Iterator[None]:
 
 
 def seen(watch: Watch, folder: Path, numbers: Sequence[float]) -> Iterator[tuple[Decision, ...]]:
-    """The effects that matter at each of the frames ``numbers`` stored in a ``folder``, found anew by ``watch``."""
+    """Show ``watch`` the frames ``numbers`` stored in a ``folder`` again, and yield the effects that matter at each frame."""
     watch.frames.clear()
     for number in numbers:
         yield watch.see(number, *places(folder, number))
@@ -104,8 +104,9 @@ def _stop_for(found: Sequence[Decision]) -> None:
 
 
 def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None, time_limit: float = math.inf) -> None:
-    """Solve, and write each frame as it is reached, then the cost; without any frame, write the rest state. ``watch`` may stop the
-    run; more than ``time_limit`` [s] of processor time of this process ends it at the next frame.
+    """Solve, and write each frame as it is reached, then the cost. If no frame is reached, write the rest state.
+
+    ``watch`` may stop the run. If this process uses more than ``time_limit`` [s] of processor time, the run ends at the next frame.
     """
 
     def add(frame: Frame) -> None:
@@ -135,7 +136,7 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
     load = clock.load()
     used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()} | ({} if load is None else {LOAD: load})
-    outcome = replace(outcome, cost=used | cost)  # a solver with its own processes states their costs
+    outcome = replace(outcome, cost=used | cost)  # a solver with processes of its own states the costs of these
     if not writer.frames:
         rest = writer.rest
         writer.add(Frame(writer.state["frames"][0], rest.surface.points, rest.fibres.points if rest.fibres else None))
@@ -144,7 +145,7 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
 
 
 def _contact(state: dict[str, Any]) -> dict[str, str]:
-    """A note on contact from the ``state`` of a run, if contact was in its equations."""
+    """A note on the first contact, from the ``state`` of a run; empty if its equations had no contact."""
     counts = state["scalars"].get("contact_points")
     if counts is None:
         return {}

@@ -19,18 +19,18 @@ from fem_reference.scenes.muscle import Keyframe, MuscleCase
 from fem_reference.studies.campaign import each
 from fem_reference.studies.execution import Bench
 
-LARGER = 1.25  # ratio of tetrahedron sizes in a second and the first run, which shows the dependence of moment arms on the size
-_EVERY, _RAD = 10, 100  # frame numbers from one frame to the next, and for a turn of a bone by 1 rad
+LARGER = 1.25  # a second run with tetrahedra larger by this factor shows the dependence of moment arms on the mesh
+_EVERY, _RAD = 10, 100  # the difference of successive frame numbers, and of those before and after a rotation by 1 rad
 NEMETH, BLEMKER = "nemeth_1985", "blemker_delp_2005"
-# Flexion [rad]: that of the shipped cases, and from -10 to 90 degrees, or as far as a reference converges.
+# Ranges of flexion [rad]: that of the shipped cases, and about -10 to 90 degrees, which ends where a reference does not converge.
 SHIPPED, WIDE = (0.0, 1.0), (-0.2, 1.6)
 _FARTHEST = 1.0  # the flexion [rad] that a run must reach
 
 
 @dataclass(frozen=True)
 class ArmStudy:
-    """A ``case``, the size of its tetrahedra [mm], the least and greatest ``flexion`` [rad], the name of its ``muscle`` in
-    published files, the ``sense`` of positive moment arms, and the ``experiments`` with which they are compared.
+    """A ``case``, the size of its tetrahedra [mm], the minimum and maximum ``flexion`` [rad], the name of its ``muscle`` in
+    published files, the ``sense`` of positive moment arms, and the ``experiments`` with which the moment arms are compared.
     """
 
     case: str
@@ -51,13 +51,15 @@ STUDIES = (
 
 
 def beside(store: Path) -> tuple[tuple[ArmsBeside, ...], dict[str, str]]:
-    """The moment arms of each wanted muscle compared with each experiment, and the reason by case if they are missing."""
+    """The moment arms of all ``STUDIES`` compared with their experiments, and the reasons why cases are missing, by case."""
     found, missing = each({one.case: one for one in STUDIES}, lambda one: list(of_case(one, store)))
     return tuple(one for several in found.values() for one in several), missing
 
 
 def of_case(wanted: ArmStudy, store: Path) -> Iterator[ArmsBeside]:
-    """The moment arms of a case compared with each of its experiments, up to its last angle; InputError if that is below 1 rad."""
+    """Compare the moment arms of a case with each of its experiments, up to the last angle that the reference reaches. Raises
+    InputError if this angle is below 1 rad.
+    """
     scene = casefile.read_muscle(wanted.case)
     (angles, arms), (others, larger) = (_arms(wanted, size * wanted.tet_size, store) for size in (1.0, LARGER))
     common = min(len(angles), len(others))  # both runs begin at the same angle
@@ -76,7 +78,7 @@ def of_case(wanted: ArmStudy, store: Path) -> Iterator[ArmsBeside]:
 
 
 def _arms(wanted: ArmStudy, tet_size: float, store: Path) -> tuple[Floats, Floats]:
-    """Angles (a,) [deg] and moment arms (a, k) [mm], positive in the wanted sense, on tetrahedra of ``tet_size`` [mm]."""
+    """Angles (a,) [deg], and moment arms (a, k) [mm] that are positive in the wanted sense, on tetrahedra of ``tet_size`` [mm]."""
     bench = Bench(coarse(casefile.read_muscle(wanted.case), tet_size, wanted.flexion), store)
     run = bench.reference()
     if run.outcome.status == "denied" or run.numbers[-1] / _RAD + 2 * wanted.flexion[0] < _FARTHEST:
@@ -86,8 +88,8 @@ def _arms(wanted: ArmStudy, tet_size: float, store: Path) -> tuple[Floats, Float
 
 
 def coarse(scene: MuscleCase, tet_size: float, flexion: tuple[float, float]) -> MuscleCase:
-    """The case on unrefined tetrahedra of ``tet_size`` [mm], without candidates, with a hip that moves from rest to the least
-    ``flexion`` [rad], 0 or less, and then to the greatest one.
+    """The case on unrefined tetrahedra of ``tet_size`` [mm], without candidates. The hip moves from rest to the minimum ``flexion``
+    [rad], which is at most 0, and then to the maximum.
     """
     back, on = (round(_RAD * angle) for angle in flexion)
     turned = {0: 0.0, -back: back / _RAD, on - 2 * back: on / _RAD}  # frame numbers and flexion
@@ -103,7 +105,9 @@ def coarse(scene: MuscleCase, tet_size: float, flexion: tuple[float, float]) -> 
 
 
 def flexion_arms(run: Run, bench: Bench[MuscleCase]) -> tuple[Floats, Floats]:
-    """Flexion angles (a,) [deg], the negative joint angles about an axis to the left, and flexion moment arms (a, k) [mm]."""
+    """Flexion angles (a,) [deg] and flexion moment arms (a, k) [mm]. The axis of the joint points to the left, so flexion is the
+    negative joint angle.
+    """
     context = context_of(bench.setup(), run)
     if len(context.joints) != 1:
         raise InputError(bench.scene.name, f"{len(context.joints)} joints", "one joint")
@@ -113,7 +117,7 @@ def flexion_arms(run: Run, bench: Bench[MuscleCase]) -> tuple[Floats, Floats]:
 
 
 def published(scene: MuscleCase, experiment: str, muscle: str) -> ArmRange:
-    """The published curve or range of a ``muscle``, from its file in the data folder."""
+    """Read the published curve or range of moment arms of a ``muscle`` from its file in the data folder."""
     record = experiments.experiments()[experiment]
     path = scene.file(f"data:{record.file}", experiment)
     with path.open(encoding="utf-8", newline="") as file:
@@ -131,7 +135,7 @@ def published(scene: MuscleCase, experiment: str, muscle: str) -> ArmRange:
 
 
 def _envelope(rows: list[dict[str, str]], muscle: str) -> ArmRange:
-    """The range [mm] of moment arms from a file in cm, at the angles of either bound that lie within those of both."""
+    """The range [mm] of moment arms from the ``rows`` of a file in cm, at all angles of either bound that both bounds cover."""
     sides = {}
     for bound in ("lower", "upper"):
         side = [row for row in rows if (row["muscle"], row["bound"]) == (muscle, bound)]

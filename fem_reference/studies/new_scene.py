@@ -20,21 +20,22 @@ from fem_reference.io import files
 from fem_reference.io.texts import toml_text
 from fem_reference.scenes import casefile
 
-# The units among which the unit of files is guessed: those of LENGTH_UNITS that scanners and modelling programs write.
+# The units among which the unit of a file is guessed: those of LENGTH_UNITS that scanners and modelling programs write.
 _GUESSED = ("mm", "cm", "m", "in")
-# The range of lengths of muscles and bones [mm]: a unit that gives a length outside it is ruled out.
+# The possible lengths of muscles and bones [mm]. A unit that gives a length outside this range is ruled out.
 _LONG = {"muscle": (20.0, 700.0), "bone": (5.0, 2500.0)}
-# The maximum distance of a muscle from its bones, relative to its length; beyond it the files do not fit together.
+# The maximum distance of a muscle from its bones, relative to the length of the muscle; beyond it the files do not fit together.
 _APART = 0.5
-# The fraction of vertices that are attached, those nearest to a bone; it is reduced if two attachments would share vertices.
+# The fractions of the muscle's vertices, nearest to a bone, that are attached. The largest fraction is used for which the two
+# attachments share no vertices.
 _ATTACHED = (0.06, 0.04, 0.025, 0.015, 0.008)
 _TETS, _REFINEMENTS = 5000, 1
-_LONGEST = 60  # the number of characters that are kept of a name that is unfit for a scene or a file
+_LONGEST = 60  # the maximum number of characters of a name that is changed because it does not suit scenes or files
 
 
 @dataclass(frozen=True)
 class Unit:
-    """The unit of length of surfaces, by ``name``; ``why`` it was guessed, empty if it was given."""
+    """The ``name`` of the unit of length of surfaces; ``why`` is the reason for a guessed unit, empty for a given one."""
 
     name: str
     why: str = ""
@@ -42,7 +43,7 @@ class Unit:
 
 @dataclass(frozen=True)
 class _Attached:
-    """An attachment to a bone: the vertices ``within`` a distance [mm] of it."""
+    """An attachment: the ``vertices`` of the muscle ``within`` a distance [mm] of a ``bone``."""
 
     bone: str
     within: float
@@ -56,11 +57,11 @@ def copied(case: str, folder: Path) -> None:
 
 
 def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | None) -> Unit:
-    """Write a scene into a new ``folder``, which names it, with the surfaces in mm; return the unit in which they were read.
+    """Write a scene with surfaces in mm into a new ``folder``, which names the scene; return the unit in which files were read.
 
-    ``muscle`` and ``bones`` are files of triangles. The muscle is attached to the two bones nearest to it, and the second of these
-    moves. ``unit``: the unit of all files, of ``LENGTH_UNITS``, or None: the only one that gives muscle and bones a usual length.
-    InputError names the unusable file, or the value that cannot be guessed.
+    ``muscle`` and ``bones`` are files of triangles. The muscle is attached to the two bones nearest to it, of which the second
+    moves. ``unit``: the unit of all files, one of ``LENGTH_UNITS``. If it is None, the unit is guessed: the only one that gives
+    muscle and bones a usual length. Raises InputError, which names the unusable file or the value that cannot be guessed.
     """
     if len(bones) < 2:
         raise InputError("--bone", f"{len(bones)} files", "two or more, which the muscle connects")
@@ -80,7 +81,7 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
 
 
 def write(folder: Path, muscle: Surface, bones: dict[str, Surface]) -> None:
-    """Write the scene of a ``muscle`` and ``bones`` by name, all in mm, into a new ``folder``; names may be any text."""
+    """Write the scene of a ``muscle`` and ``bones``, all in mm, into a new ``folder``. The names of bones may be any text."""
     around, paths = dict[str, Surface](), {"muscle": "muscle.ply"}
     for name, surface in bones.items():
         clean = _distinct(name if is_name(name) else _cleaned(name), {"muscle", *around})
@@ -103,13 +104,13 @@ def is_name(name: str) -> bool:
 
 
 def _cleaned(name: str) -> str:
-    """The ``name`` on one line, of printable characters, and not too long."""
+    """The ``name`` shortened to one line of printable characters."""
     shown = "".join(letter if letter.isprintable() else "_" for letter in name)[:_LONGEST].strip()
     return shown.lstrip(".") or "bone"
 
 
 def _distinct(name: str, taken: Container[str]) -> str:
-    """The ``name``, with a number if it is ``taken``."""
+    """The ``name``, with a number appended if the name is ``taken``."""
     numbered = (f"{name}_{i}" for i in count(2))
     return name if name not in taken else next(one for one in numbered if one not in taken)
 
@@ -124,7 +125,7 @@ def _new(folder: Path) -> Path:
 
 
 def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
-    """The only unit in which the size of every surface is possible; InputError if none or several are possible."""
+    """The only unit in which every surface has a possible size. Raises InputError if no unit or several units are possible."""
     fitting, said = list[set[str]](), list[str]()
     for surface, kind in ((muscle, "muscle"), *((bone, "bone") for bone in bones)):
         size, (least, most) = diagonal(surface.points), _LONG[kind]
@@ -140,7 +141,9 @@ def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
 
 
 def _welded(surface: Surface, unit: float) -> Surface:
-    """The surface in mm, with equal points merged, in their order: STL files have three points for each triangle."""
+    """The surface in mm with equal points merged, as STL files have three points for each triangle. ``unit``: its unit [mm]. The
+    order of points is kept, and triangles whose corners are merged with each other are removed.
+    """
     points = surface.points * unit
     _, first, which = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
     place = first.argsort().argsort()
@@ -150,7 +153,7 @@ def _welded(surface: Surface, unit: float) -> Surface:
 
 
 def _attachments(muscle: Surface, bones: dict[str, Surface]) -> tuple[_Attached, _Attached]:
-    """Attachments to the two bones nearest to the muscle, at its vertices nearest to each; no vertex is in both."""
+    """Attachments to the two bones nearest to the muscle, each at the vertices nearest to the bone. No vertex is in both."""
     away = {name: distances(muscle.points, bone).distance for name, bone in bones.items()}
     first, second = sorted(away, key=lambda name: float(np.quantile(away[name], _ATTACHED[-1])))[:2]
     for name in (first, second):
@@ -172,7 +175,7 @@ def _nearest(bone: str, away: Floats, share: float) -> _Attached:
 
 
 def _text(name: str, muscle: Surface, bones: dict[str, Surface], paths: dict[str, str]) -> str:
-    """The text of the scene file; ``paths`` are those of the surfaces, by name."""
+    """The text of the scene file. ``paths``: the paths of the surfaces by name."""
     ends = _attachments(muscle, bones)
     volume = enclosed_volume(muscle.points, muscle.triangles)
     wanted = np.cbrt(6 * np.sqrt(2) * volume / _TETS * 8**_REFINEMENTS)
@@ -209,7 +212,9 @@ def _text(name: str, muscle: Surface, bones: dict[str, Surface], paths: dict[str
 
 
 def _joint(muscle: Surface, bones: dict[str, Surface], ends: tuple[_Attached, _Attached]) -> tuple[Floats, Floats]:
-    """A guess of the axis and the centre of the motion between two bones: across the muscle, at the bones' nearest points."""
+    """A guess of the axis (3,) and the centre (3,) [mm] of the rotation between two bones. The axis is perpendicular to the line
+    between the attachments; the centre lies midway between the nearest points of the bones.
+    """
     first, second = (bones[end.bone].points for end in ends)
     away, which = cKDTree(first).query(second)
     nearest = int(away.argmin())

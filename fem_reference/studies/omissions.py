@@ -1,4 +1,4 @@
-"""Changes due to leaving out each effect of a scene in turn, or each optional feature of a solver, and all of them."""
+"""Changes of results when each effect of a scene or each optional feature of a solver is left out in turn, and when all are."""
 
 import logging
 import math
@@ -29,13 +29,13 @@ from fem_reference.studies.variations import Trial
 
 log = logging.getLogger(__name__)
 
-# A run with something left out may take this many times as long as the complete run, plus a time [s] to compile a new form.
+# A run with a part left out may take ``LIMIT`` times as long as the complete run, plus a time [s] to compile a new form.
 LIMIT, COMPILING = 2.0, 60.0
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A part left out of a trial: ``effects`` of its scene, ``features`` of its solver, and ``support`` by contact at rest."""
+    """A part of a trial to leave out: ``effects`` of the scene, ``features`` of the solver, ``support`` by contact at rest."""
 
     effects: dict[str, Effect]
     features: tuple[str, ...] = ()
@@ -48,7 +48,7 @@ class LeftOut:
 
 
 def study(case: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
-    """The reference and the candidates of a case, complete and with each part left out; runs in ``store`` are not solved again."""
+    """Run the reference and the candidates of a case, complete and with each part left out. Runs in ``store`` are reused."""
     with fenicsx.shared():
         if workers == Workers():
             _warm_up(case, store)
@@ -72,14 +72,16 @@ def is_material(effect: Effect) -> bool:
 
 
 def name_of(effect: Effect) -> str:
-    """The name of an effect in scene files, with the region or the part of the surface on which it acts, if any."""
+    """The name of an effect in scene files. If the effect acts on a part of the surface or in a region, this is added."""
     name = effects.name_of(effect)
     name += f" on {effect.on}" if isinstance(effect, Load) else ""
     return name + (f" in {region}" if (region := effects.region_of(effect)) else "")
 
 
 def features(choice: SolverChoice, place: str) -> tuple[str, ...]:
-    """The optional features of a choice: keys with default None, except those that trade accuracy for time or change time only."""
+    """The optional features of a solver that a ``choice`` uses: its settings whose default is None, except settings that trade
+    accuracy for time or affect only the time.
+    """
     record = solvers.find(choice.solver, place).settings
     optional = {key for key, entry in record.model_fields.items() if entry.default is None}
     optional -= {*solvers.trades(record), *MACHINE_ONLY}
@@ -87,9 +89,11 @@ def features(choice: SolverChoice, place: str) -> tuple[str, ...]:
 
 
 def parts(whole: Trial) -> tuple[LeftOut, ...]:
-    """Everything that can be left out of a trial: each effect of the scene except its material, if the solver simulates effects,
-    else each feature of the solver; and all of them together. An elastic effect always remains. Tension at rest is left out
-    together with all that it balances: effects that act at the first frame, and the support by bones.
+    """The parts that can be left out of a trial, each by itself, and all of them together.
+
+    If the solver simulates effects, the parts are the effects of the scene except its material; otherwise they are the features of
+    the solver. An elastic effect always remains. Tension at rest is left out together with everything that it balances: effects
+    that act at the first frame, and the support by bones.
     """
     if not solvers.takes_effects(whole.choice.solver):
         found = features(whole.choice, whole.name)
@@ -102,7 +106,7 @@ def parts(whole: Trial) -> tuple[LeftOut, ...]:
 
 
 def _with_rest(case: MuscleCase, some: dict[str, Effect], named: dict[str, Effect]) -> LeftOut:
-    """The part with ``some`` of the ``named`` effects, and with all that depends on them."""
+    """The part that consists of ``some`` of the ``named`` effects and, with tension at rest, of everything that it balances."""
     if in_situ.among(some.values()) is None:
         return LeftOut(some)
     first, contact = case.frames.first, among(case.effects)
@@ -130,7 +134,7 @@ def _kept(case: MuscleCase, part: LeftOut) -> tuple[Effect, ...]:
 
 
 def fitting(element: str, effects: Sequence[Effect]) -> str:
-    """The element with the cells and the displacement of ``element`` that has a pressure if and only if an effect adds it."""
+    """The element with the cells and the displacement degree of ``element``, with a pressure if and only if an effect needs it."""
     kind, degree, pressure = ELEMENTS[element]
     brings = any("pressure" in effect.unknowns for effect in effects)
     if (pressure is not None) == brings:
@@ -140,14 +144,14 @@ def fitting(element: str, effects: Sequence[Effect]) -> str:
 
 
 def _wholes(case: MuscleCase) -> list[Trial]:
-    """The trials of the reference and of candidates with something that can be left out."""
+    """The complete trials: the reference, and the candidates that have a part to leave out."""
     trials = [Trial(case, candidate, candidate.name) for candidate in case.candidate]
     moving = (one for one in trials if solvers.find(one.choice.solver, one.name).moves != "nothing")
     return [Trial(case, case.reference, "reference"), *(one for one in moving if parts(one))]
 
 
 def _warm_up(case: MuscleCase, store: Path) -> None:
-    """Solve the first frames with each candidate and keep nothing, so that later measurements find compiled code."""
+    """Solve the first frames with each candidate and discard the results, so that compilation does not count in measured times."""
     bench = shared_bench(case, store)
     for trial in _wholes(case)[1:]:
         if solvers.takes_effects(trial.choice.solver):
@@ -161,7 +165,7 @@ def _warm_up(case: MuscleCase, store: Path) -> None:
 
 
 def _limited(trial: Trial, whole: Made) -> Trial:
-    """The trial of a run with something left out, with a time limit if its solver has that setting."""
+    """The ``trial`` with a time limit that depends on the cost of the ``whole`` run, if the solver has such a setting."""
     settings = solvers.settings(whole.trial.choice, whole.trial.name)
     if whole.run is None or "time_limit" not in type(settings).model_fields:
         return trial
@@ -171,7 +175,7 @@ def _limited(trial: Trial, whole: Made) -> Trial:
 
 
 def _bars(bench: Bench[MuscleCase], truth: Run | None) -> tuple[dict[str, float], str]:
-    """The error bars of the reference, the greatest over the frames, and the reason if there are none."""
+    """The maximum error bar of the reference over frames, by statistic; and the reason if there are no error bars."""
     if truth is None:
         return {}, "the reference did not reach all frames"
     try:
@@ -213,7 +217,9 @@ def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:
 
 
 def changes(one: Made, whole: Run, context: MeasurementContext) -> dict[str, float]:
-    """The greatest change over frames from the ``whole`` by ``metric.statistic``; empty for an unfinished run or if any is NaN."""
+    """The maximum difference over frames from the run ``whole``, by ``metric.statistic``. Empty if the run of ``one`` is unfinished
+    or a difference is not finite.
+    """
     if one.reached is None:
         return {}
     found = greatest(one.reached, whole, context, {name.split(".")[0] for name in MEASURES})

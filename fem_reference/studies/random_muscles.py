@@ -1,4 +1,4 @@
-"""Random muscles as cases, determined by a seed: a spindle or strap between two bones, with motion and activation."""
+"""Cases with random muscles that a seed determines: a spindle or a strap between two bones, with motion and activation."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,8 +11,8 @@ from fem_reference.io import files
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 
-EVERY = 10  # frame numbers from one pose to the next
-_AROUND, _ALONG = 20, 21  # the vertices around and along every surface; vertex i is at the same part of each
+EVERY = 10  # the difference of the frame numbers of successive poses
+_AROUND, _ALONG = 20, 21  # the number of vertices around and along each surface; vertices with equal index correspond
 _TETS = 150  # the approximate number of tetrahedra, each of which is then cut into eight
 _MOTION = "motion = {{ {kind}, keyframes = [{keys}] }}\n"
 _OBSTACLE = """
@@ -45,7 +45,7 @@ pennation = "{:.4g} deg\""""
 
 
 def shape(rng: np.random.Generator) -> tuple[Surface, float]:
-    """A closed surface along z, with elliptical sections and flat ends at 0 and at its length, and this length [mm]."""
+    """A closed surface along z, and its length [mm]. It has elliptical sections, and flat ends at z = 0 and at its length."""
     length, wide = rng.uniform(50, 110), rng.uniform(9, 16)
     flat, first, last = rng.uniform(0.55, 1), rng.uniform(0.5, 0.95), rng.uniform(0.5, 0.95)
     belly, bow = rng.uniform(0.35, 0.65), rng.uniform(0, 0.1) * length
@@ -70,7 +70,7 @@ def _text(values: Sequence[float]) -> str:
 
 
 def _keys(name: str, unit: str, amounts: Floats) -> str:
-    """Keyframes of the ``amounts`` (f,), from 0 at frame 0."""
+    """The text of keyframes with the value 0 at frame 0, followed by the ``amounts`` (f,)."""
     quote = '"' if unit else ""
     values = [0.0, *amounts]
     return ", ".join(
@@ -85,9 +85,11 @@ def _turn(axis: Sequence[float], centre: Sequence[float], amounts: Floats) -> st
 
 
 def write(folder: Path, seed: int, number: int, poses: int) -> MuscleCase:
-    """Write muscle ``number`` of a ``seed`` into a ``folder``, with a number of random ``poses`` besides rest. The lower bone
-    turns about an axis beside the muscle. Of every three muscles, two have an upper bone that turns about another axis, one has an
-    obstacle that slides into its side, and two are activated. The seed and the number determine all random values.
+    """Write muscle ``number`` of a ``seed`` into a ``folder``, with rest and the given number of random ``poses``; return its case.
+
+    The lower bone rotates about an axis next to the muscle. Of every three muscles, two have an upper bone that rotates about
+    another axis, one has an obstacle that slides into its side, and two are activated. The seed and the number determine all random
+    values.
     """
     rng = np.random.default_rng([seed, number])
     surface, length = shape(rng)
@@ -103,11 +105,11 @@ def write(folder: Path, seed: int, number: int, poses: int) -> MuscleCase:
 
 
 def _drawn(rng: np.random.Generator, surface: Surface, number: int, poses: int) -> dict[str, object]:
-    """Material, fibres and motion of muscle ``number``, as texts of its case."""
+    """Material, fibres and motion of muscle ``number``, as texts for its case file."""
     length, side = surface.points[:, 2].max(), surface.points[:, 1].max()
     leans, arm, mu = rng.uniform(0, 2 * np.pi), rng.uniform(12, 30), np.exp(rng.uniform(*np.log([10, 40])))
     along, centre = [np.cos(leans), np.sin(leans), 0], [-arm * np.sin(leans), arm * np.cos(leans), 0]
-    lower = np.degrees(length / arm) * rng.uniform(-0.02, 0.1, poses)  # stretches the middle line by a tenth at most
+    lower = np.degrees(length / arm) * rng.uniform(-0.02, 0.1, poses)  # stretches the centre line by at most a tenth
     found: dict[str, object] = {"mu": f"{mu:.4g}", "lower": _turn(along, centre, lower)}
     found |= {"upper": "", "obstacle": "", "effects": ""}
     axis, upper = rng.normal(size=3), rng.uniform(-10, 10, poses)

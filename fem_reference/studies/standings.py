@@ -1,4 +1,4 @@
-"""Standings of the reference, our solvers, other people's programs and submitted frames on cases; valid rows are kept."""
+"""Standings: the reference, our solvers, other people's programs and submitted frames on shared cases. Valid rows are reused."""
 
 import hashlib
 import logging
@@ -28,25 +28,27 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# Our own cases, which need no data, then cases with the report's anatomy, in the order of their cost.
+# Our own cases, which need no downloaded data, then cases with the report's anatomy in order of cost.
 CASES = (
     *("hip_flexion_tendon", "hip_flexion", "box_squeeze"),
     *("adductor_brevis", "gluteus_medius", "iliacus_anatomical", "box_squeeze_report", "gluteus_maximus"),
 )
 # The default limit of processor time [s] for a solver on a case.
 TIME_LIMIT = 600.0
-# The entry for the machine if frames were submitted with their time.
+# The entry for the machine in rows of submitted frames.
 THEIRS = "as stated by its authors"
-# The distance [mm] (rms) within which the reference must be back at rest in the last frame for solvers to be measured there.
+# The return of solvers to rest is measured only if the reference is within this distance [mm] (rms) of rest in the last frame.
 _BACK = 0.1
-# The metrics of all rows; the joint moment only if a solver has forces.
+# The metrics of all rows; the joint moment is measured only for solvers with forces.
 _METRICS = (*in_tables(), "joint_moment")
 
 
 @dataclass(frozen=True)
 class Entrant:
-    """A solver in standings: its ``group``; for a program the ``law`` that it states and the effects that it models (``takes``);
-    for submitted frames the ``case``, empty for all cases, and the key of the exported ``scene``, empty if unknown.
+    """A solver in standings, and the ``group`` to which it belongs.
+
+    A program may state its ``law`` and the effects that it models (``takes``). Submitted frames belong to a ``case`` (empty: to all
+    cases), and state the key of the exported ``scene`` (empty: unknown).
     """
 
     candidate: Candidate
@@ -59,7 +61,7 @@ class Entrant:
 
 
 def program(folder: Path) -> Entrant:
-    """The program ``NAME/NAME.py`` in a ``folder`` of that name, with the settings of its ``candidate.toml`` as options."""
+    """The program ``NAME.py`` in a ``folder`` NAME. The settings in its ``candidate.toml`` become options on its command line."""
     file = folder / recorded.ABOUT
     said = parse(command.Description, texts.toml(file), str(file))
     if said.law is not None:
@@ -71,7 +73,9 @@ def program(folder: Path) -> Entrant:
 
 
 def submission(folder: Path) -> Entrant:
-    """The frames in a ``folder``, as its ``candidate.toml`` submits them: with case, name, version and a hash of each file."""
+    """The submitted frames in a ``folder``. The file ``candidate.toml`` there must state case, name, version and the hash of each
+    file; otherwise InputError is raised.
+    """
     said, place = recorded.about(folder), folder / recorded.ABOUT
     for key in ("case", "name", "version", "sha256"):
         if not getattr(said, key):
@@ -93,9 +97,11 @@ def stand(
     only: Collection[str] = (),
     time_limit: float = TIME_LIMIT,
 ) -> Standings:
-    """The standings of our solvers and the ``entrants`` over ``scenes``, with runs in ``store``; each may take ``time_limit`` [s]
-    of processor time on a case, whatever its own limit is. Of the rows ``before``, those of other cases are kept; if ``only`` names
-    states (``STATES``), rows in other states are kept too.
+    """The standings of our solvers and the ``entrants`` on ``scenes``, with runs in ``store``.
+
+    ``time_limit``: the processor time [s] that a solver may take on a case, whatever its own limit is. ``before``: the rows of
+    earlier standings. Rows of other cases are reused; if ``only`` names states (of ``STATES``), rows that are in none of these
+    states are reused as well.
     """
     _check_names(entrants)
     limit = {"time_limit": f"{time_limit:g} s"}
@@ -166,7 +172,7 @@ def _on(
 
 @dataclass(frozen=True, eq=False)
 class _Measured:
-    """Parts that all rows of a case share."""
+    """Data that all rows of a case share."""
 
     bench: Bench[MuscleCase]
     reference: Run
@@ -178,7 +184,7 @@ class _Measured:
         return "" if self.reference.folder is None else self.reference.folder.name
 
     def key(self, one: Entrant) -> str:
-        """The key of the run of an entrant; for submitted frames a hash of the submission."""
+        """The key of an entrant's run; for submitted frames, a hash of the submission."""
         if one.candidate.solver == "recorded":
             said = recorded.checked_about(Path(one.candidate.settings["folder"]), None)
             return hashlib.sha256(said.model_dump_json().encode()).hexdigest()[:16]
@@ -189,7 +195,9 @@ class _Measured:
         return made(one.candidate.name, one.candidate, one.candidate.name)
 
     def row(self, one: Entrant, run: Run, key: str) -> Standing:
-        """The row of a run of this ``key``; timed out if it took more than the time limit, even if stored under another limit."""
+        """The row of a run with this ``key``. A run that took more than the time limit counts as timed out, even if it was solved
+        with another limit.
+        """
         own = run is self.reference
         submitted = one.candidate.solver == "recorded"  # then its time was measured on another machine
         limit = None if own or submitted else self.bench.time_limit
@@ -224,7 +232,7 @@ class _Measured:
         )
 
     def _split(self, one: Entrant, run: Run) -> dict[str, float]:
-        """The parts of the error of a solver that states its law, if its run and the intermediate references reached all frames."""
+        """The parts of the error of a solver that states its law; empty if its run or an intermediate reference is unfinished."""
         if one.law is None or run.outcome.status != "converged":
             return {}
         try:
@@ -236,6 +244,6 @@ class _Measured:
 
 
 def _from_rest(run: Run, reference: Run) -> float | None:
-    """The distance [mm] (rms) from the first to the last frame; None if the reference does not return to rest."""
+    """The distance [mm] (rms) between the first and the last frame of a run; None if the reference does not return to rest."""
     away = [np.sqrt(np.mean(np.sum((one.positions[-1] - one.positions[0]) ** 2, axis=1))) for one in (run, reference)]
     return float(away[0]) if away[1] <= _BACK and np.isfinite(away[0]) else None

@@ -1,4 +1,4 @@
-"""Table 5.1 of the report: every solver on every scenario, timed and measured against the reference; stored runs are reused."""
+"""Table 5.1 of the report: time and accuracy of every solver on every scenario, relative to the reference; runs are reused."""
 
 import logging
 from collections.abc import Iterable
@@ -22,8 +22,8 @@ from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 
-# Our own scenes, which need no data, and the five of the report (6.1.3 to 6.1.6). The iliacus has its anatomical attachments here:
-# with those of the report's program it has no solution beyond frame 77 (see the case).
+# Our own scenes, which need no downloaded data, and the five of the report (6.1.3 to 6.1.6). The iliacus has its anatomical
+# attachments here, because with those of the report's program it has no solution beyond frame 77 (see the case).
 SCENARIOS = (
     "hip_flexion",
     "box_squeeze",
@@ -42,8 +42,10 @@ _AVOIDS = ("collision", "contact", "voxels")  # settings with which a solver avo
 def stand(
     scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Candidate]], *, error_bars: bool = False
 ) -> Table:
-    """The table over ``scenes``, with runs in ``store``; frames of ``foreign`` solvers, by case, are read first. The reference has
-    its stored error bars, if any, else new ones if ``error_bars``.
+    """The table of all solvers on ``scenes``, with runs in ``store``.
+
+    ``foreign``: the user's solvers by case; recorded frames are read before anything is solved. With ``error_bars``, missing error
+    bars of the reference are computed; otherwise only stored ones are used.
     """
     rows, scenarios, results = solver_kinds(), list[Scenario](), list[SolverResult]()
     benches = {scene.name: Bench(scene, store) for scene in scenes}
@@ -71,7 +73,7 @@ def _on(
     commands: list[Candidate],
     error_bars: bool,
 ) -> tuple[Scenario, list[SolverResult]]:
-    """The results of all solvers on the scene of a bench, the reference first."""
+    """The scenario of a bench, and the results of all solvers on it, the reference first."""
     scene = bench.scene
     reference = complete(bench.reference(), scene.numbers)
     bars = refinement.bars(bench, reference, model=False) if error_bars else refinement.stored(reference)
@@ -94,7 +96,7 @@ def _on(
 
 
 def chosen(case: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Candidate, str]]:
-    """The solvers measured on a case, row by row: the kind, the candidate, and the place that names it."""
+    """The solvers that are measured on a case, in the order of ``rows``: the kind, the candidate, and the place that chooses it."""
     found = list[tuple[str, Candidate, str]]()
     for row in rows:
         for i, candidate in enumerate(case.candidate):
@@ -105,8 +107,8 @@ def chosen(case: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Cand
 
 
 def needs(case: MuscleCase, choice: SolverChoice, context: MeasurementContext) -> dict[str, int]:
-    """The parameters that a solver needs on a case: settings, parameters of the effects that it simulates, attachments, shapes of
-    bones that it avoids, and fibres. Empty for recorded frames.
+    """The number of parameters that a solver needs on a case, by kind: settings, parameters of the effects that it simulates,
+    attachments, shapes of the bones that it avoids, and fibres. Empty for recorded frames.
     """
     offer = solvers.find(choice.solver, "")
     if offer.moves == "nothing":
@@ -127,7 +129,7 @@ def needs(case: MuscleCase, choice: SolverChoice, context: MeasurementContext) -
 
 
 def stated(record: Record) -> int:
-    """The number of values of a ``record`` that are required or differ from defaults; values of nested records count one by one."""
+    """The number of values of a ``record`` that are required or differ from their defaults, including those of nested records."""
     fields = type(record).model_fields.items()
     given = [(field, getattr(record, key)) for key, field in fields]
     return sum(_leaves(value) for field, value in given if field.is_required() or value != field.default)
@@ -156,7 +158,9 @@ def _result(
 
 
 def seconds_of(run: Run) -> float | None:
-    """The time [s] per frame number if each is computed or ``candidate.toml`` states it, else per wanted frame; None if unknown."""
+    """The time [s] per frame number, if the solver computes every frame number or ``candidate.toml`` states the time; otherwise the
+    time per requested frame; None if unknown.
+    """
     cost = run.outcome.cost
     given = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
     return seconds_per_frame(run) if given is None else given

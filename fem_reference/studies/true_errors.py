@@ -1,4 +1,4 @@
-"""True errors from finer solutions (smaller tetrahedra, stiffer contact), with which error bars are compared."""
+"""Comparison of error bars with true errors, which come from finer solutions (smaller tetrahedra, stiffer contact)."""
 
 from collections.abc import Iterable
 from functools import partial
@@ -25,7 +25,7 @@ CASES = (
 
 
 def stake(scenes: Iterable[MuscleCase], store: Path) -> Claims:
-    """The claims of the references of ``scenes``, with runs in ``store``, solved if they are missing."""
+    """Claims of error bars for the reference of each of ``scenes``, with true errors. Runs missing in ``store`` are solved."""
     named = {scene.name: scene for scene in scenes}
     found, missing = each(named, partial(_of, store=store))
     why = "its reference, or the finer solution, did not reach all frames"
@@ -50,7 +50,7 @@ def _of(case: MuscleCase, store: Path) -> list[Claim]:
 
 
 def claims_of(case: str, bars: ErrorBars, runs: tuple[Run, Run], context: MeasurementContext) -> list[Claim]:
-    """Claims of ``bars`` about changes from rest and deviations of the first of two runs; the second is more accurate."""
+    """Claims of ``bars`` about changes from rest and deviations of the first run; the second run is more accurate."""
     names = dict.fromkeys(metric for metric, _ in CLAIMED)
     changes = [change(one, context, names) for one in runs]
     surfaces = [as_surface(one) for one in runs]

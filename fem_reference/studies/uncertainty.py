@@ -21,16 +21,19 @@ from fem_reference.studies.campaign import Workers, carry_out, shared_bench
 from fem_reference.studies.unknowns import Unknowns, unknowns
 from fem_reference.studies.variations import Trial
 
-# The quantities with a band, besides the surface and forces, if a case has them.
+# The quantities that have a band if a case has them, in addition to the surface and forces.
 QUANTITIES = ("volume.deviation", "fibre_length.mean", "moment_arm.mean", "joint_moment.moment")
 SURFACE = ("surface_deviation", "rms")
 FORCE = "force on "
 
 
 def study(case: MuscleCase, store: Path, workers: Workers, runs: int, seed: int = 1) -> Uncertainty:
-    """Bands of a case from ``runs`` of its reference, none if the case has no solution; InputError if no parameter has a range."""
+    """Compute bands of a case from a number of ``runs`` of its reference, with workers and a ``seed`` of the design.
+
+    There are no bands if the case itself has no solution. Raises InputError if no parameter has a range.
+    """
     varied = unknowns(case)
-    case, parameters = varied.case.model_copy(update={"expect": ()}), varied.parameters()  # as nothing is to be judged
+    case, parameters = varied.case.model_copy(update={"expect": ()}), varied.parameters()  # nothing is to be judged
     points = sampled(len(parameters), runs, seed)
     trials = [_trial(varied, parameters, point) for point in points]
     title, size = varied.whole.title, varied.whole.muscle.tet_size / 2**varied.whole.muscle.refinements
@@ -62,14 +65,14 @@ def study(case: MuscleCase, store: Path, workers: Workers, runs: int, seed: int 
 
 
 def _trial(varied: Unknowns, parameters: Sequence[Parameter], point: Floats) -> Trial:
-    """The run of the reference at a ``point`` (d,) of the design."""
+    """The trial of the reference at a ``point`` (d,) of the design."""
     values = {one.key: one.value(float(at)) for one, at in zip(parameters, point, strict=True)}
     said = ", ".join(f"{one.title} {values[one.key]:.3g} {one.unit}".rstrip() for one in parameters)
     return Trial(varied.at(values), varied.whole.reference, "reference", "design", said, values)
 
 
 def _nominal(case: MuscleCase, reference: Run, store: Path, workers: Workers) -> tuple[Comparison, dict[str, str]]:
-    """The comparison of the case itself, with error bars, and the reasons why candidates did not reach all frames, by name."""
+    """The comparison of the case itself, with error bars, and the reasons by name why candidates did not reach all frames."""
     bench = shared_bench(case, store)
     bars = refinement.bars(bench, reference, model=False)
     made = carry_out([Trial(case, one, one.name) for one in case.candidate], store, workers)
@@ -78,7 +81,7 @@ def _nominal(case: MuscleCase, reference: Run, store: Path, workers: Workers) ->
 
 
 def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iterator[Band]:
-    """The band of each quantity that the case has, from the ``runs`` of the ``design`` that have results."""
+    """The band of each quantity that the case has, from those ``runs`` of the ``design`` that reached all frames."""
     whole = [complete(run, comparison.reference.numbers) for run in runs]
     context = comparison.context
     assert isinstance(context, MeasurementContext)  # the case is of a muscle
@@ -102,12 +105,12 @@ def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iter
 
 
 def _rows(found: Sequence[Floats], like: Floats) -> Floats:
-    """The values (n, f) of n runs, even for n = 0."""
+    """The values ``found`` of n runs as an array (n, f), also for n = 0; ``like`` (f,) has a value for each frame."""
     return np.array(found).reshape(len(found), len(like))
 
 
 def _surface(comparison: Comparison, context: MeasurementContext, design: Design, runs: Sequence[Run]) -> Band:
-    """The band of the distance of the surface from the nominal result, root mean square over the area."""
+    """The band of the rms distance of the surfaces of ``runs`` from that of the nominal result, averaged over the area."""
     reference, bars = comparison.reference, comparison.error_bars
     title, frames = "Distance of the surface from the nominal result, rms", len(reference.numbers)
     empty = _empty(comparison, ".".join(SURFACE), title, described()[SURFACE].unit, np.zeros(frames))
@@ -121,13 +124,13 @@ def _surface(comparison: Comparison, context: MeasurementContext, design: Design
 
 
 def _empty(comparison: Comparison, quantity: str, title: str, unit: str, nominal: Floats) -> Band:
-    """A band without values yet, around the result of the case."""
+    """A band that has no values yet except the result of the case (``nominal``)."""
     unknown = np.full(len(nominal), np.nan)
     return Band(quantity, title, unit, comparison.reference.numbers, nominal, unknown, unknown, unknown)
 
 
 def _beside(comparison: Comparison, found: Sequence[Band]) -> Iterator[tuple[Run, Band, Floats]]:
-    """Each candidate with each band that was not refused, and the candidate's values (f,) of the quantity."""
+    """Each candidate with each band that was not refused, and the candidate's values (f,) of the band's quantity."""
     for run in comparison.candidates:
         for band in found:
             metric, _, statistic = band.quantity.partition(".")

@@ -28,9 +28,10 @@ from fem_reference.scenes.muscle import DrivenCase, MuscleCase, VertexList
 from fem_reference.scenes.muscles import with_muscles
 
 TETRAHEDRA, TRIANGLES = "tetrahedra", "triangles"
-# Sizes of tetrahedra relative to the case's, each with every number of refinements up to the case's own.
+# Sizes of tetrahedra relative to that of the case; each is combined with every number of refinements up to that of the case.
 _SIZES = (2.0, 1.6, 1.25, 1.0)
-# The reference's settings are varied on the mesh before the last refinement or, without one, on tetrahedra larger by this factor.
+# Settings of the reference are varied on the mesh before its last refinement or, if it is not refined, on tetrahedra larger by
+# this factor.
 _COARSER = 1.6
 _REFINED = {0: "not refined", 1: "refined once", 2: "refined twice"}
 _STIFFNESSES, _DISTANCES = (0.1, 0.3, 3.0), (10.0, 3.0, 0.3)
@@ -38,17 +39,19 @@ type Vary[C] = Callable[[C], C]
 
 
 def on_tetrahedra[C: DrivenCase](case: C, **changes: float) -> C:
-    """The case with other values of keys of its muscle, or of each of several: ``tet_size`` [mm], ``refinements``."""
+    """The case with other values of ``tet_size`` [mm] or ``refinements`` for each of its muscles."""
     return with_muscles(case, lambda _: changes)
 
 
 def on_larger[C: DrivenCase](case: C, ratio: float) -> C:
-    """The case on tetrahedra of ``ratio`` times the size, in each of its muscles."""
+    """The case with tetrahedra ``ratio`` times as large in each of its muscles."""
     return with_muscles(case, lambda one: {"tet_size": ratio * one.tet_size})
 
 
 def with_contact[C: DrivenCase](case: C, kind: type[Effect] = Contact, **changes: float) -> C:
-    """The case with other parameters of its contact of a ``kind``: with bones, or of muscles with themselves or each other."""
+    """The case with other parameters of its contact. The ``kind`` of effect is contact with bones, by default, or contact of
+    muscles with themselves or each other.
+    """
     effects = (one.model_copy(update=changes) if isinstance(one, kind) else one for one in case.effect)
     return case.model_copy(update={"effect": tuple(effects)})
 
@@ -59,7 +62,9 @@ def by_springs(case: MuscleCase) -> bool:
 
 
 def with_distances[C: DrivenCase](case: C, factor: float, *keys: str) -> C:
-    """The case with ``keys`` that control distances to surfaces of bones multiplied by ``factor``; closed forms are exact."""
+    """The case with ``keys`` of its bones, which control the accuracy of distances, multiplied by ``factor``. Only bones with a
+    surface are changed, as distances to closed forms are exact.
+    """
     bones = (
         bone.model_copy(update={key: factor * getattr(bone, key) for key in keys}) if bone.surface else bone
         for bone in case.bone
@@ -68,7 +73,9 @@ def with_distances[C: DrivenCase](case: C, factor: float, *keys: str) -> C:
 
 
 def with_half_steps[C: DrivenCase](case: C, settings: Record) -> Vary[C]:
-    """A change to load steps of at most half the length; each step ends at a frame, so ``frames.every`` bounds its length too."""
+    """A function that changes a case to load steps of at most half the length. As a step ends at each frame, ``frames.every`` also
+    limits the length of the steps of ``case``, which have the ``settings`` of its reference.
+    """
     own = settings.model_dump()
     largest = min(case.frames.every, own["largest_step"] or math.inf) / 2
     halved = {"first_step": own["first_step"] / 2, "largest_step": largest}
@@ -81,9 +88,10 @@ def without_states(choice: SolverChoice) -> SolverChoice:
 
 
 def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
-    """The case on a surface with ``4**power`` times as many triangles; its files, named by their contents, go into ``folder``.
+    """The case on a surface with ``4**power`` times as many triangles.
 
-    A vertex is attached if the nearest vertex of the original surface is.
+    The files of the new surface are written into a folder below ``folder`` that is named after their contents. A vertex is attached
+    if the nearest vertex of the original surface is attached.
     """
     surface = resampled(setup.surface, power)
     named = hashlib.sha256(surface.points.tobytes() + surface.triangles.tobytes()).hexdigest()[:16]
@@ -99,19 +107,19 @@ def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> Muscle
         listed = {"vertices": VertexList(file=str(path)), "within": None, "outline": None}
         attachments.append(entry.model_copy(update=listed))
     muscle = case.muscle.model_copy(update={"surface": str(place / "surface.vtp"), "unit": 1.0})
-    # As no scene file names these surfaces, they may be in any folder.
+    # No scene file names these surfaces, so they may be in any folder.
     return case.model_copy(update={"muscle": muscle, "attachment": tuple(attachments), "from_file": False})
 
 
 def nearest_vertices(surface: Surface, points: Floats) -> Floats:
-    """The vertices (n,) nearest to ``points`` (n, 3): corners of the nearest triangles, by barycentric coordinates."""
+    """The vertex (n,) near each of ``points`` (n, 3): of the nearest triangle, the corner with the largest barycentric weight."""
     found = distances(points, surface)
     corners = surface.triangles[found.triangle]
     return np.asarray(np.take_along_axis(corners, found.barycentric.argmax(axis=1)[:, None], axis=1)[:, 0])
 
 
 def carried(run: Run, surface: Surface) -> Run:
-    """A ``run`` on another surface, carried to the vertices of ``surface`` by the extension that also carries fibres."""
+    """A ``run`` on another surface, transferred to the vertices of ``surface`` by the extension that also moves fibres."""
     if len(run.surface.points) == len(surface.points) and np.allclose(run.surface.points, surface.points):
         return run
     extension = Extension.to(surface.points, run.surface)
@@ -121,8 +129,8 @@ def carried(run: Run, surface: Surface) -> Run:
 
 @dataclass(frozen=True)
 class Trial:
-    """A run to be made on a ``scene`` by a ``choice`` of solver: its ``name``, the varied key (``knob``) and its ``value``, and the
-    ``changed`` keys of the scene, as scene files write them.
+    """A run that is to be made: a ``scene``, a ``choice`` of solver and a ``name``. One key (``knob``) may have been varied to a
+    ``value``; ``changed`` holds the changed keys of the scene, as scene files write them.
     """
 
     scene: MuscleCase
@@ -138,13 +146,15 @@ class Trial:
         return f"{self.name}, {self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
 
     def varied(self, knob: str, value: str, **changes: Any) -> "Trial":
-        """The trial with ``changes`` of its fields, named by a ``knob`` in addition to its former one."""
+        """A copy of the trial with ``changes`` to its fields, and with a new ``knob`` and ``value``. A previous knob is appended to
+        the value in brackets.
+        """
         beside = f" ({self.knob} = {self.value})" if self.knob else ""
         return replace(self, knob=knob, value=value + beside, **changes)
 
 
 def reference_trials(case: MuscleCase) -> Iterator[Trial]:
-    """The reference of a case on other tetrahedra; on coarse ones also with other settings of its solver and other contact."""
+    """Trials of the reference of a case: unchanged, on other tetrahedra, and, on a coarse mesh, with other settings and contact."""
     whole = Trial(case, case.reference, "reference")
     yield whole
     yield from _sizes(whole)
@@ -155,8 +165,9 @@ def reference_trials(case: MuscleCase) -> Iterator[Trial]:
 
 
 def candidate_trials(case: MuscleCase, surfaces: Mapping[str, MuscleCase]) -> Iterator[Trial]:
-    """The candidates of a case, and those of Table 5.1 for every scene: with their own settings, with each setting that trades
-    accuracy for time varied, and on other meshes; ``surfaces``: the case on other triangles, by name.
+    """Trials of the candidates of a case and of the candidates that Table 5.1 has for every scene: with their own settings, with
+    other values of each setting that trades accuracy for time, and on other meshes. ``surfaces``: the case on other triangles, by
+    name.
     """
     known = list[dict[str, Any]]()
     for candidate in (*case.candidate, *solvers.in_table()):
@@ -195,7 +206,7 @@ def _on(whole: Trial, size: float, refinements: int) -> Trial:
 
 
 def _settings(base: Trial) -> Iterator[Trial]:
-    """A trial for each listed value of each setting, except its present value and values that other settings exclude."""
+    """A trial for each listed value of each setting, except the present value and values that other settings exclude."""
     own = solvers.settings(base.choice, base.name)
     for key, values in solvers.trades(type(own)).items():
         for value in values:
@@ -210,7 +221,9 @@ def _settings(base: Trial) -> Iterator[Trial]:
 
 
 def _by_element(base: Trial, choice: SolverChoice, text: str) -> Trial:
-    """The trial with another element; if it does not suit the effects, a penalty replaces the pressure, or the reverse."""
+    """The trial with another element. If the element does not suit the effects, the pressure field of the incompressible effect is
+    replaced by a penalty, or the reverse.
+    """
     plain, effects = base.varied("element", text, choice=choice), list(base.scene.effects)
     found = [one for one in effects if isinstance(one, Incompressible | IncompressiblePenalty)]
     if len(found) != 1 or _suits(choice, base.scene.effects):

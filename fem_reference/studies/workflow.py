@@ -1,4 +1,4 @@
-"""Python API: the steps from a case to a page, one call each."""
+"""Python API: one function for each step from a case to a page."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -25,9 +25,10 @@ STORE = Path("reports/runs")
 
 
 def load_case(case: str | Path, changes: Mapping[str, object] | None = None) -> Case:
-    """Read a ``case``: the name of a shipped case, a folder with a ``case.toml``, or a scene file; with ``changes``: keys such as
-    ``"frames.last"`` or ``"effect[1].bulk"`` with other values, as scene files write them. InputError if a key is missing,
-    unknown or wrong; the error states the file, the key, the value and the expected value.
+    """Read a ``case``: the name of a shipped case, a folder with a ``case.toml``, or a scene file.
+
+    ``changes``: other values, as in scene files, for keys such as ``"frames.last"`` or ``"effect[1].bulk"``. Raises InputError if a
+    key is missing, unknown or wrong; the error states the file, the key, the value and the expected value.
     """
     arguments.check_changes(changes)
     path(case, "case")
@@ -43,14 +44,16 @@ def solve(
     progress: Progress | None = None,
     **settings: Any,
 ) -> Run:
-    """Solve a case, or read its stored run; a run is stored under a key that depends on everything that determines it.
+    """Solve a case, or read its stored run. Runs are stored under a key that depends on everything that determines the result.
 
-    ``solver``: its name, such as ``"pbd"``, or your function ``solver(scene, out, **settings)``, which reads a folder that
-    :func:`export_case` writes and writes frames into another; without it the reference, with the settings of the case. ``settings``
-    are those of the ``solver``, as scene files write them; by default those of the case for it, else those of Table 5.1.
-    ``muscle``: in a case of several muscles, the one that the ``solver`` solves by itself; the reference solves all together. The
-    run has ``positions`` (f, n, 3) [mm] of the surface's vertices in each frame, ``outcome`` (status, message, cost) and
-    ``folder``. If the solution fails, the status states this, and the frames reached before are kept.
+    ``solver``: the name of a solver, such as ``"pbd"``, or your function ``solver(scene, out, **settings)``. Your function reads
+    the folder ``scene``, which :func:`export_case` has written, and writes frames into the folder ``out``. Without a ``solver`` the
+    reference of the case is solved. ``settings``: the settings of the ``solver``, as in scene files; by default those of the case
+    for this solver or, if the case has none, those of Table 5.1. ``muscle``: in a case of several muscles, the muscle that the
+    ``solver`` solves by itself; the reference solves all muscles together.
+
+    The run has ``positions`` (f, n, 3) [mm] of the surface's vertices in each frame, an ``outcome`` (status, message, cost) and a
+    ``folder``. If the solution fails, the status says so, and the frames that were reached are kept.
     """
     arguments.check_case(case)
     arguments.check_solver(solver, settings, muscle)
@@ -62,7 +65,7 @@ def solve(
 
 
 def _bench(case: Case, muscle: str, folder: Path) -> Bench[Any]:
-    """The bench of a case, or of the ``muscle`` with this name if it is not empty; InputError if the case has no such muscle."""
+    """The bench of a case or, if a ``muscle`` is named, of this muscle. Raises InputError if the case has no such muscle."""
     if not muscle:
         return Bench(case, folder)
     arguments.check_muscle(muscle, case)
@@ -72,7 +75,7 @@ def _bench(case: Case, muscle: str, folder: Path) -> Bench[Any]:
 def _chosen(
     case: Case, solver: str | Callable[..., None] | None, settings: dict[str, Any], folder: Path
 ) -> tuple[str, SolverChoice]:
-    """The name of a run and its solver; a function is written below the ``folder`` of runs."""
+    """The name of a run, and its solver with settings. A function is saved below the ``folder`` of runs."""
     if callable(solver):
         return solver.__name__, command.of_function(solver, settings, folder / "functions")
     if solver is None:
@@ -81,11 +84,12 @@ def _chosen(
 
 
 def read_run(folder: str | Path, case: Case, *, unit: str | None = None, muscle: str = "") -> Run:
-    """Read frames that another program wrote, ``positions`` (f, n, 3) [mm] of the vertices of the case's muscle in the same order.
+    """Read frames that another program wrote: ``positions`` (f, n, 3) [mm] of the muscle's vertices, in the order of the case.
 
-    ``folder``: a folder with a mesh per frame, or a file of a sequence; ``candidate.toml`` in it may state name and unit. ``unit``:
-    the unit of length, by default that of ``candidate.toml``, else mm. ``muscle``: its name, if there are several.
-    InputError if a file cannot be read completely, or its vertices or its first frame are not those of the case.
+    ``folder``: a folder with a mesh for each frame, or a file with a sequence of frames; a ``candidate.toml`` in the folder may
+    state name and unit. ``unit``: the unit of length, by default that of ``candidate.toml`` or, without one, mm. ``muscle``: the
+    name of the muscle, if the case has several. Raises InputError if a file cannot be read completely, or if the vertices or the
+    first frame are not those of the case.
     """
     arguments.check_case(case)
     choice = recorded.choice(path(folder, "folder"), unit)
@@ -112,13 +116,13 @@ def error_bars(
     store: str | Path = STORE,
     progress: Progress | None = None,
 ) -> ErrorBars | BodyBars | None:
-    """Estimate the error of each statistic of a reference, from runs on larger tetrahedra and with finer contact; or that of a
-    body, from a solution on smaller cells or with more unknowns in each cell.
+    """Estimate the error of each statistic of a reference from runs on larger tetrahedra and with finer contact. The error of a
+    body is estimated from one solution on smaller cells or with more unknowns in each cell.
 
-    ``reference``: the result of :func:`solve` without a ``solver``, next to which bars are stored, or of :func:`solve_body`.
-    ``muscle``: the name of the muscle whose bars are wanted, in a case of several; the runs solve all muscles.
-    Each statistic has a bar for each frame, in its unit; a body has bars of points, forces, moments and energy. None if the
-    reference did not converge.
+    ``reference``: the run that :func:`solve` returned without a ``solver``, next to which the error bars are stored; or the run
+    that :func:`solve_body` returned. ``muscle``: in a case of several muscles, the muscle whose error bars are wanted; the runs
+    always solve all muscles. Each statistic has an error bar for each frame, in the unit of the statistic; a body has error bars of
+    points, forces, moments and energy. Returns None if the reference did not converge.
     """
     with reported(progress):
         arguments.check_muscle(muscle, case)
@@ -140,10 +144,11 @@ def compare(
 ) -> Comparison:
     """Measure candidates against the reference of a case, and judge the expectations of the case.
 
-    A frame that a run did not reach is NaN, and never a pass. With ``error_bars`` of the reference, from :func:`error_bars`, a
-    verdict that they leave in doubt is inconclusive. ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: ``values``
-    (f,), ``unit``, ``worst`` frame. ``muscle``: in a case of several muscles, the one that is compared; ``reference`` is the run
-    of all muscles, ``candidates`` are runs of this muscle.
+    A frame that a run did not reach has the value NaN and never passes. With ``error_bars`` of the reference, which
+    :func:`error_bars` returns, a verdict is inconclusive if the error bars leave it in doubt. The measure
+    ``comparison["pbd", "surface_deviation", "rms"]`` has ``values`` (f,), a ``unit`` and a ``worst`` frame. ``muscle``: in a case
+    of several muscles, the muscle that is compared; ``reference`` is then the run of all muscles, and ``candidates`` are runs of
+    this muscle.
     """
     arguments.check_case(case)
     arguments.check_run(reference, case, "reference")
@@ -157,10 +162,10 @@ def compare(
 
 
 def export_case(case: Case, folder: str | Path, form: export.Format = "open") -> list[str]:
-    """Write all that another program needs to solve a case into a new or empty ``folder``; return the names of the files.
+    """Write everything that another program needs to solve a case into a new or empty ``folder``; return the names of the files.
 
-    ``form``: ``"open"`` for PLY, VTU, MSH, VTK, CSV and JSON, in mm; ``"febio"`` for FEBio's input file too. InputError if
-    ``folder`` is not empty, or FEBio lacks an effect.
+    ``form``: ``"open"`` for PLY, VTU, MSH, VTK, CSV and JSON files in mm; ``"febio"`` for an input file of FEBio in addition.
+    Raises InputError if ``folder`` is not empty, or if FEBio does not have an effect of the case.
     """
     arguments.check_case(case)
     muscle = casefile.muscle(case)
@@ -168,10 +173,10 @@ def export_case(case: Case, folder: str | Path, form: export.Format = "open") ->
 
 
 def export_runs(comparison: Comparison, folder: str | Path) -> list[str]:
-    """Write the runs of a muscle for ParaView into a new or empty ``folder``; return the names of the files, or raise InputError.
+    """Write the runs of a muscle for ParaView into a new or empty ``folder``; return the names of the files.
 
-    ``runs.pvd`` opens all frames, with named blocks and arrays on them; the README.md among the files describes each array.
-    Stress, pressure and det F are included if the reference was solved with ``store_state = true``.
+    Open ``runs.pvd`` to see all frames as named blocks with arrays; README.md describes each array. Stress, pressure and det F are
+    included if the reference was solved with ``store_state = true``. Raises InputError if the runs cannot be exported.
     """
     arguments.check_comparison(comparison)
     return paraview.write(comparison, arguments.free_folder(folder, "folder"))
@@ -184,11 +189,11 @@ def write_report(comparison: Comparison, folder: str | Path) -> Path:
 
 
 def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any) -> Run:
-    """Solve a body of any shape, whose prescribed displacements may be your own functions, with the reference, FEniCSx.
+    """Solve a body of any shape with FEniCSx, the reference. Prescribed displacements may be your own functions.
 
-    ``settings`` are as under ``[reference]`` in a scene file: ``element``, ``first_step``, ``residual``, ... The run has
-    ``states``, each with ``points`` (n, 3) [mm] of the nodes and ``forces`` (3,) [N] by name of the prescribed displacement, and
-    the ``outcome``. :func:`error_bars` estimates the error due to the size of the cells.
+    ``settings``: those under ``[reference]`` in a scene file, such as ``element``, ``first_step`` or ``residual``. The run has an
+    ``outcome`` and ``states``. Each state has ``points`` (n, 3) [mm] of the nodes, and ``forces`` (3,) [N] by name of the
+    prescribed displacement. :func:`error_bars` estimates the error due to the size of the cells.
     """
     with reported(progress):
         chosen = parse(fenicsx.BodySettings, settings, "settings")

@@ -144,5 +144,5 @@ def lose_one(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_case_without_a_range_is_refused(tmp_path: Path) -> None:
     case = pulled(tmp_path, {})
     bare = case.model_copy(update={"effect": case.effect[1:]})
-    with pytest.raises(InputError, match=r"uncertain: got no parameter with a range, want a range of some number"):
+    with pytest.raises(InputError, match=r"uncertain: got no parameter with a range, want a range of a parameter"):
         uncertainty.study(bare, tmp_path / "runs", Workers(), runs=4)

@@ -1,4 +1,4 @@
-"""Sections of the page of a comparison: a template for each, and the facts that some of them need.
+"""Sections of the page of a comparison: a template for each section, and modules with the facts that some sections need.
 
-Contract (tests/report/test_sections.py): a section is shown only if its numbers exist, and repeats no id.
+Contract (tests/report/test_sections.py): a section is shown only if its numbers exist, and uses no id of another section.
 """

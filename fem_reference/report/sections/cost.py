@@ -1,4 +1,4 @@
-"""Costs of every run, and of the reference frame by frame."""
+"""Costs of every run, and costs of the reference in each frame."""
 
 import math
 from typing import Any
@@ -33,7 +33,7 @@ def facts(comparison: Comparison) -> dict[str, Any]:
 
 
 def _drawn(reference: Run) -> Drawing | None:
-    """The processor time of each frame as bars, None if it is not known."""
+    """A bar chart of the processor time of each frame; None if the times are not known."""
     seconds = reference.scalars.get("seconds_processor")
     if seconds is None:
         return None

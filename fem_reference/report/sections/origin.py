@@ -20,7 +20,7 @@ def facts(comparison: Comparison) -> dict[str, Any]:
 
 
 def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
-    """Every (key, value) below ``table``, keys joined by dots."""
+    """All keys and values in a nested ``table``; the keys of the levels are joined by dots."""
     if isinstance(table, dict):
         return [entry for name, value in table.items() for entry in _flat(value, f"{key}.{name}".lstrip("."))]
     return [(key, table if isinstance(table, str | float | int | None) else json.dumps(table, default=str))]
@@ -40,7 +40,9 @@ def changes(case: Case) -> list[tuple[str, Any, Any]]:
 
 
 def _table(case: Case) -> dict[str, Any]:
-    """The case as nested tables, with entries of lists by number, and with all effects of its file, even if some are left out."""
+    """The case as nested tables. Entries of lists have their number as key. All effects of the file are included, even those that
+    are left out.
+    """
     effects = [one.effect for one in case.decisions] or case.effects
     listed: dict[str, Any] = {"effect": [effect.model_dump(mode="json") for effect in effects]}
     listed |= {"choice": "auto"} if case.decisions else {}

@@ -1,4 +1,4 @@
-"""Blocks as problems: an axis-aligned lattice of tetrahedra, whose boundary is the surface given to solvers."""
+"""Problems of blocks: axis-aligned lattices of tetrahedra, whose boundary is the surface that solvers receive."""
 
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -24,16 +24,16 @@ from fem_reference.problems.paths import Along
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.studies.hard.records import FACES, FIRST, Face, Hard, Hold, Lattice, Start
 
-# The default material of blocks: the usual matrix of muscle.
+# The default material of blocks: the usual matrix material of muscle.
 MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible", bulk="10 MPa"))
 _LINES, _POINTS = 4, 9  # the number of measured lines of each block, and of points of each line
 # The bones of held faces are spheres far from the block; their radius and distance are relative to the size of the block.
 _BALL, _AWAY = 0.01, 50.0
-_SAME = 1e-9  # the greatest rounding difference between equal motions of two holds, relative to the block's size
+_SAME = 1e-9  # the maximum rounding difference between equal motions of two holds, relative to the block's size
 
 
 def problem(hard: Hard) -> MuscleProblem:
-    """The problem that the block of ``hard`` poses."""
+    """The problem of the block of ``hard``."""
     block, frames, acting = hard.block, hard.frames, hard.effect or MATERIAL
     assert block is not None  # a Hard record with a block has frames
     assert frames is not None
@@ -61,7 +61,9 @@ def problem(hard: Hard) -> MuscleProblem:
 
 
 def several(hard: Hard) -> MusclesProblem:
-    """The problem of the block of ``hard`` and the bodies beside it; any two may touch if contact between them acts."""
+    """The problem of the block of ``hard`` and its further bodies. Contact acts between any two if ``hard`` has the effect
+    "touching".
+    """
     law, apart = touching_among(hard.effect), dict[str, MuscleProblem]()
     parts = {FIRST: hard}
     for one in hard.beside:
@@ -78,21 +80,23 @@ def several(hard: Hard) -> MusclesProblem:
 
 
 def _named(name: str, one: MuscleProblem) -> MuscleProblem:
-    """The block ``one``, with its ``name`` before the names of the bones of its holds."""
+    """The problem ``one``, with ``name`` as a prefix to the names of the bones of its holds."""
     held = (replace(entry, bone=replace(entry.bone, name=f"{name}: {entry.bone.name}")) for entry in one.attached)
     return replace(one, attached=tuple(held))
 
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """A block about its ``middle`` (3,) [mm] with cells of size ``cell`` [mm], moved as ``start`` describes."""
+    """The map from rest to the state that ``start`` describes, for a block with the centre ``middle`` (3,) [mm] and cells of size
+    ``cell`` [mm].
+    """
 
     start: Start
     middle: Floats
     cell: float
 
     def __call__(self, points: Floats) -> Floats:
-        """Positions of rest points (n, 3) [mm]; the random displacement of a point does not depend on the other points."""
+        """Positions (n, 3) [mm] of rest points (n, 3). The random displacement of a point does not depend on the other points."""
         match self.start.kind:
             case "point":
                 return np.broadcast_to(self.middle, points.shape).copy()
@@ -121,22 +125,24 @@ def _placed(block: Lattice, nodes: Ints) -> Floats:
         shares[:, k] = np.concatenate([[0.0], np.cumsum(lengths) / lengths.sum()])[nodes[:, k]]
     if block.jitter:
         random = np.random.default_rng(block.seed).uniform(-1, 1, shares.shape) * block.jitter / np.array(block.cells)
-        random[(nodes == 0) | (nodes == block.cells)] = 0  # faces stay flat; edges and corners stay in place
+        random[(nodes == 0) | (nodes == block.cells)] = 0  # faces stay flat, edges straight, and corners in place
         shares += random
     around = shares if block.rounding == 0 else (1 + _rounded(2 * shares - 1, block.rounding)) / 2
     return np.asarray(np.asarray(block.corner) + around * np.asarray(block.size))
 
 
 def _rounded(unit: Floats, share: float) -> Floats:
-    """Points ``unit`` (n, 3) of the cube from -1 to 1 moved towards the inscribed sphere by the fraction ``share``. With y and z
-    the other two coordinates, x goes to ``x (1 - y^2/2 - z^2/2 + y^2 z^2/3)^(1/2)``, which maps the cube's surface to the sphere's.
+    """Move the points ``unit`` (n, 3) of the cube from -1 to 1 towards the unit ball by the fraction ``share`` of their way.
+
+    A coordinate x becomes ``x (1 - y^2/2 - z^2/2 + y^2 z^2/3)^(1/2)``, where y and z are the other two coordinates. This maps the
+    surface of the cube onto the unit sphere.
     """
     y, z = (np.roll(unit, -turn, axis=1) ** 2 for turn in (1, 2))
     return np.asarray(unit * (1 - share + share * np.sqrt(1 - y / 2 - z / 2 + y * z / 3)))
 
 
 def _on(block: Lattice, nodes: Ints, face: Face) -> Ints:
-    """Indices (k,) of the ``nodes`` (n, 3) of the lattice on a ``face``."""
+    """Indices (k,) of those ``nodes`` (n, 3) of the lattice that lie on a ``face``."""
     axis = "xyz".index(face[0])
     return np.flatnonzero(nodes[:, axis] == (block.cells[axis] if face[1] == "1" else 0))
 

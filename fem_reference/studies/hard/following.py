@@ -1,4 +1,4 @@
-"""Runs of hard cases: their frames, whose health is measured, and their repetition in other load steps and on other meshes."""
+"""Runs of hard cases, whose frames are measured for their health, and repetitions with other load steps and on other meshes."""
 
 import time
 from collections import Counter
@@ -23,28 +23,31 @@ from fem_reference.solvers import fenicsx
 from fem_reference.solvers.common.protocol import MuscleSolver
 from fem_reference.studies.hard.records import REFERENCE, SECOND, Hard, Lattice, StepCounts, task_of
 
-_MOST_FOR_SECOND = 200  # tetrahedra that the second solver solves in seconds
-SAME = 0.01  # [%] of the body's size: states that differ by more are different
-_CUTS = 64  # the greatest factor by which a load step is cut before the run gives up
-MOVED = 0.1  # greatest random displacement of points of a block, in cells
-SIZES = 0.03  # greatest relative change of the tetrahedron size of a shipped case
-LONGEST = 60.0  # greatest processor time [s] of a run that is repeated
+_MOST_FOR_SECOND = 200  # the maximum number of tetrahedra for scikit-fem, which solves these within seconds
+SAME = 0.01  # [%] of the body's size: the maximum distance between two states that count as the same
+_CUTS = 64  # the maximum factor by which a load step is reduced before the run ends as failed
+MOVED = 0.1  # the maximum random displacement of the points of a block, in cell sizes
+SIZES = 0.03  # the maximum relative change of the tetrahedron size of a shipped case
+LONGEST = 60.0  # the maximum processor time [s] of a run that is repeated on other meshes
 
 Solve = Callable[[Hard], tuple[Outcome, Followed]]
 
 
 class StalledError(Exception):
-    """Raised if the machine was too busy for a conclusion about a run."""
+    """Raised if the machine was too busy to draw a conclusion about a run."""
 
 
 def check_not_stalled(outcome: Outcome) -> None:
-    """Raise StalledError if an ``outcome`` allows no conclusion about the run."""
+    """Raise StalledError if the ``outcome`` is that of a run on a machine that was too busy."""
     if outcome.status == "stalled":
         raise StalledError(outcome.message)
 
 
 def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]:
-    """Solve a problem by a solver; InputError if it does not suit the solver, StalledError if the machine was too busy."""
+    """Solve a problem, and return the outcome and the frames for measures of health.
+
+    Raises InputError if the problem does not suit the solver, and StalledError if the machine was too busy.
+    """
     solver, task, muscle = choice.solver, task_of(choice.solver, built.task), mechanical(built)
     as_body = muscle is not None and task == "solve_body"
     offer = solvers.find(solver, solver, task)
@@ -83,7 +86,7 @@ def _of_muscle(built: MechanicalProblem, frames: list[Frame]) -> Followed:
     whole = len(tets) == len(frames)
 
     def scalar(name: str) -> Floats | None:
-        """A scalar of all frames (f,); None if a frame lacks it."""
+        """The values (f,) of a scalar in all frames; None if a frame lacks the scalar."""
         found = [frame.scalars[name] for frame in frames if name in frame.scalars]
         return np.array(found) if len(found) == len(frames) else None
 
@@ -108,20 +111,22 @@ def _of_muscle(built: MechanicalProblem, frames: list[Frame]) -> Followed:
 
 @dataclass(frozen=True)
 class SameEnd:
-    """A comparison of runs that should end alike: ``same`` is True if those that reached the end agree; ``sentence`` states it."""
+    """A comparison of runs that should end alike: ``same`` is True if they do, and ``sentence`` states the result in words."""
 
     same: bool
     sentence: str
 
 
 def farthest(followed: Followed) -> StepCounts | None:
-    """Load steps to the frame at which a run is farthest from its first state; None for a run that did not leave it."""
+    """The default numbers of load steps, up to the frame at which a run is farthest from its first state; None if nothing moved."""
     moved = np.linalg.norm(followed.positions[1:] - followed.positions[0], axis=2).max(axis=1, initial=0.0)
     return StepCounts(until=followed.numbers[1 + int(np.argmax(moved))]) if len(moved) and moved.max() > 0 else None
 
 
 def in_steps(built: MechanicalProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
-    """Compare runs of the reference up to a frame, each in another number of equal load steps, with the finest that reached it."""
+    """Solve the reference up to a frame in several numbers of equal load steps, and compare the end states. The standard is the
+    end state with the largest number of steps that reached the frame.
+    """
     ends, words, span = dict[int, Floats](), list[str](), steps.until - built.frames[0]
     for count in steps.counts:
         step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}
@@ -142,12 +147,12 @@ def in_steps(built: MechanicalProblem, choice: SolverChoice, steps: StepCounts) 
 
 
 def jittered(hard: Hard, number: int) -> Hard:
-    """The case on a random mesh; the seed ``number`` determines it."""
+    """The case on a jittered mesh, which the seed ``number`` determines."""
     if hard.block is not None:
         others = [one.model_copy(update={"block": _shaken(one.block, number)}) for one in hard.beside]
         return hard.model_copy(update={"block": _shaken(hard.block, number), "beside": tuple(others)})
     shipped = hard.shipped
-    assert shipped is not None  # a Hard record has one of the two
+    assert shipped is not None  # a Hard record has either a block or a shipped case
     size = casefile.muscle(shipped.read()).muscle.tet_size
     share = 1 + SIZES * np.random.default_rng(number).uniform(-1, 1)
     changed = shipped.changes | {"muscle.tet_size": f"{share * float(size)!r} mm"}
@@ -159,7 +164,9 @@ def _shaken(block: Lattice, number: int) -> Lattice:
 
 
 def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solve) -> SameEnd:
-    """Compare ``count`` runs on other meshes with the ``first``: status, and greatest distance over frames [% of the size]."""
+    """Solve a case on ``count`` jittered meshes by the function ``solve``, and compare the statuses, and the positions in common
+    frames, with those of the ``first`` run.
+    """
     begin, elsewhere, outcome, followed = time.process_time(), 0.0, *first
     ended, off, reached = Counter[str](), list[float](), list[int]()
     for number in range(1, count + 1):
@@ -186,7 +193,7 @@ def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: So
 
 
 def _apart(one: Followed, other: Followed) -> float:
-    """The greatest distance between two runs over the frames of both [% of the body's size]."""
+    """The maximum distance between two runs over their common frames [% of the body's size]."""
     both, off = min(len(one.numbers), len(other.numbers)), list[float]()
     for first, second in zip(one.bodies, other.bodies, strict=True):
         moved = second.positions[:both]

@@ -24,7 +24,7 @@ from fem_reference.scenes.muscle import CaseBone, Frames, Motion
 FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
 FACES: tuple[Face, ...] = get_args(Face)
-_MOST_CELLS = 50_000  # the maximum number of cells of a block, more than any solver solves within its time limit
+_MOST_CELLS = 50_000  # the maximum number of cells of a block; no solver solves as many within its time limit
 FIRST = "block"  # the name of the first of several bodies
 REFERENCE, SECOND = "fenicsx", "scikit_fem"
 LIMIT = 120.0  # the limit of processor time of a run [s]
@@ -36,12 +36,13 @@ _OWN: dict[str, dict[str, Any]] = {
 
 
 class Lattice(Record):
-    """A block of ``size`` from its ``corner``, with a number of ``cells`` along each axis, each cut into six tetrahedra.
+    """A block of the given ``size``, whose lower corner is ``corner``. It has a number of ``cells`` along each axis, and each cell
+    is cut into six tetrahedra.
 
-    ``grading``: along each axis, ratio of last to first cell. ``jitter``: the greatest random displacement, in cell sizes, of nodes
-    inside the block and inside its faces; ``seed``: the seed of the random numbers. ``rounding``: the degree to which the block is
-    morphed into an ellipsoid, from 0 (a block) to almost 1 (an ellipsoid). ``fibre``: the direction of fibres and of the measured
-    lines. ``points_apart`` [mm]: the spacing of points of contact and springs, by default as on muscles.
+    ``grading``: the ratio of the length of the last cell to that of the first, along each axis. ``jitter``: the maximum random
+    displacement of nodes, in cell sizes; nodes on faces and edges stay on them. ``seed``: the seed of the random displacements.
+    ``rounding``: 0 for a block; values close to 1 turn it into an ellipsoid. ``fibre``: the direction of fibres and of the measured
+    lines. ``points_apart`` [mm]: the spacing of the points for contact and springs, by default the same as on muscles.
     """
 
     size: Point
@@ -60,7 +61,11 @@ class Lattice(Record):
 
 
 class Hold(Record):
-    """A ``face`` of a block, or its ``middle`` vertex, attached to a bone at rest or in ``motion``, by springs or exactly."""
+    """A ``face`` of a block that is attached to a bone; with ``middle``, only the vertex at the centre of the face is attached.
+
+    Without ``motion`` the bone stays in place. With ``stiffness`` springs connect the face to the bone; otherwise the face moves
+    exactly with the bone.
+    """
 
     face: Face
     middle: bool = False
@@ -69,7 +74,9 @@ class Hold(Record):
 
 
 class OtherBody(Record):
-    """Another body, by its ``name``: a ``block``, its ``hold``, and effects (``effect``) that replace those of the first body."""
+    """A further body and its ``name``: a ``block``, its attachments (``hold``) and its effects (``effect``), by default those of
+    the first body.
+    """
 
     name: Name
     block: Lattice
@@ -78,8 +85,11 @@ class OtherBody(Record):
 
 
 class Start(Record):
-    """The state at the first frame instead of rest: points moved at ``random`` by up to ``amount`` cell sizes, or the whole body
-    collapsed to its middle ``point`` or onto its middle ``plane`` normal to z, or turned ``inside out``.
+    """A state at the first frame that replaces the rest state.
+
+    ``random``: points are displaced at random by up to ``amount`` cell sizes. ``point``: the body is collapsed to its centre.
+    ``plane``: the body is collapsed onto the plane through its centre normal to z. ``inside out``: the body is mirrored at this
+    plane.
     """
 
     kind: Literal["random", "point", "plane", "inside out"]
@@ -87,32 +97,34 @@ class Start(Record):
 
 
 class Shipped(Record):
-    """A shipped ``case``, at its quick size if ``quick``, with ``changes`` of its keys."""
+    """A shipped ``case``, at its quick size if ``quick``, with ``changes`` to its keys."""
 
     case: str
     quick: bool = False
     changes: dict[str, Any] = Field(default_factory=dict)
 
     def read(self) -> Case:
-        """The case with its changes; InputError if it cannot be read."""
+        """Read the case with its changes. Raises InputError if the changed case is invalid."""
         quick = casefile.read(self.case).quick if self.quick else {}
         return casefile.read(self.case, changes=quick | self.changes)
 
 
 class StepCounts(Record):
-    """Numbers of equal load steps (``counts``) in which the reference solves up to frame ``until``; all should end in one state."""
+    """Numbers of equal load steps (``counts``) in which the reference is solved up to frame ``until``. The state at this frame
+    should be the same for every number of steps.
+    """
 
     until: int
     counts: tuple[Annotated[int, Field(gt=0)], ...] = Field(default=(1, 10, 40), min_length=1)
 
 
 class Hard(Record):
-    """A hard case: a ``block`` with its effects, bones and attachments, and bodies ``beside`` it; or a ``shipped`` case.
+    """A hard case: a ``block`` with its effects, bones and attachments, and further bodies (``beside``); or a ``shipped`` case.
 
-    ``healthy`` describes a healthy run in words, ``bound`` in numbers, the decisive quantity first. ``only``: the solvers that the
-    case is about, by default all; ``because``: the reason. ``no_solution``: the reason why no equilibrium exists, so that a run
-    should end with a status other than ``converged``. ``contrast``: the defect that the case demonstrates, so that a run should
-    exceed its bound. ``by_effects``: the case depends on its effects and does not apply to solvers that simulate none.
+    ``healthy`` describes a healthy run in words; ``bound`` limits its quantities, the decisive quantity first. ``only``: the
+    solvers that the case is about, by default all; ``because``: the reason. ``no_solution``: the reason why no equilibrium exists;
+    a run should then end with a status other than ``converged``. ``contrast``: the defect that the case demonstrates; a run should
+    then exceed its bound. ``by_effects``: the case depends on its effects and does not apply to solvers that simulate none.
     ``settings``: for each solver, the settings that differ from those for Table 5.1 of the report. ``steps``: see ``StepCounts``.
     """
 
@@ -175,13 +187,15 @@ class Hard(Record):
     _check_because = rule(lambda one: bool(one.only) == bool(one.because), '"because" with "only", and only with it')
 
     def choice(self, defaults: SolverChoice) -> SolverChoice:
-        """The solver of ``defaults`` with the settings that this case changes."""
+        """The solver and settings of ``defaults``, with the settings that this case changes."""
         changes = self.settings.get(defaults.solver, {})
         return SolverChoice(**{"solver": defaults.solver, **defaults.settings, **changes})
 
 
 def choices() -> dict[str, SolverChoice]:
-    """Settings of each solver for hard cases: special ones, else those of the first candidate of Table 5.1 with this solver."""
+    """The settings of each solver for hard cases: those in ``_OWN`` or, for other solvers, those of the first candidate of
+    Table 5.1 that uses the solver.
+    """
     found = {name: SolverChoice(solver=name, **settings) for name, settings in _OWN.items()}
     for candidate in solvers.in_table():
         found.setdefault(candidate.solver, SolverChoice(solver=candidate.solver, **candidate.settings))
@@ -189,7 +203,7 @@ def choices() -> dict[str, SolverChoice]:
 
 
 def task_of(solver: str, task: Task) -> Task:
-    """The task of a solver in a case of a ``task``: the second solver solves muscles as bodies."""
+    """The task that a solver performs in a case with this ``task``: scikit-fem solves muscles as bodies."""
     return "solve_body" if task == "solve" and solver == SECOND else task
 
 
@@ -199,7 +213,7 @@ def folders() -> list[str]:
 
 
 def read_all(names: tuple[str, ...] = ()) -> tuple[Hard, ...]:
-    """Every hard case, or those in folders or variants of these ``names``; InputError for a name without a case."""
+    """Read every hard case or, if there are ``names`` of folders or variants, only those. Raises InputError for an unknown name."""
     found = [hard for folder in folders() for hard in read(FOLDER / folder / "case.toml")]
     own = [{hard.name, hard.name.partition(".")[0]} for hard in found]
     for name in names:
@@ -209,7 +223,9 @@ def read_all(names: tuple[str, ...] = ()) -> tuple[Hard, ...]:
 
 
 def read(path: Path) -> Iterator[Hard]:
-    """The hard cases in a file: the case itself, or one for each ``[[variant]]`` with its keys; InputError if one is invalid."""
+    """Read the hard cases of a file: a single case, or one for each ``[[variant]]``, whose keys replace those of the file. Raises
+    InputError if a case is invalid.
+    """
     table, folder = texts.toml(path), path.parent.name
     if "variant" not in table:
         yield _hard(table, folder, str(path))
@@ -227,7 +243,7 @@ def read(path: Path) -> Iterator[Hard]:
 
 
 def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
-    """The hard case with the keys of ``table``."""
+    """Check the keys of ``table``, and make the hard case ``name`` from them. ``where``: the file and key for error messages."""
     whose = {"name": name, "place": where}
     for key in whose:
         if key in table:
@@ -250,7 +266,7 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
         consistency.check_acting(hard.effect, [bone.name for bone in hard.bone], hard.frames, where)
     _check_solvers(hard, task)
     timed = hard.frames or scene
-    assert timed is not None  # a Hard record has one of the two
+    assert timed is not None  # a Hard record has either frames or a shipped case
     if hard.steps is not None and hard.steps.until not in range(timed.numbers[0] + 1, timed.numbers[-1] + 1):
         want = f"a frame after {timed.numbers[0]}, up to {timed.numbers[-1]}"
         raise InputError(join(where, "steps.until"), hard.steps.until, want)
@@ -258,7 +274,7 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
 
 
 def _check_solvers(hard: Hard, task: Task) -> None:
-    """Raise InputError if a case names a solver that does not solve hard cases, or a setting that a solver lacks."""
+    """Raise InputError if a case names a solver that does not solve hard cases, or a setting that its solver does not have."""
     named = [(f"only[{i}]", name) for i, name in enumerate(hard.only)]
     known = choices() if named or hard.settings else {}
     for key, name in [*named, *((f"settings.{name}", name) for name in hard.settings)]:
@@ -271,6 +287,6 @@ def _check_solvers(hard: Hard, task: Task) -> None:
 
 
 def _merged(table: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """``table`` with the keys of ``changes`` in place of its own; nested tables are merged key by key."""
+    """Update ``table`` with the keys of ``changes``; nested tables are merged key by key."""
     both = [key for key, value in changes.items() if isinstance(value, dict) and isinstance(table.get(key), dict)]
     return table | changes | {key: _merged(table[key], changes[key]) for key in both}

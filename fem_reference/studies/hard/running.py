@@ -1,4 +1,4 @@
-"""Every solver on every hard case: runs and their results."""
+"""Runs of every solver on every hard case, and their verdicts."""
 
 import logging
 import re
@@ -34,23 +34,24 @@ from fem_reference.studies.law_split import LAW
 
 log = logging.getLogger(__name__)
 
-# The least time [s] after which a limit raises again, long enough for the first exception to end the work.
+# The minimum time [s] until a limit raises its exception again, long enough for the first exception to end the run.
 _AGAIN = 1.0
-LONGER = 600.0  # the limit of processor time [s] of a case's runs in several numbers of load steps or on several meshes
+# The limit of processor time [s] if a case is repeated in several numbers of load steps or on several meshes.
+LONGER = 600.0
 # The pattern of a rest position [mm] in messages.
 _PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
 
 
 class _Late(Exception):  # noqa: N818 - it is an event in a run, not an error, and caught in this module
-    """A run took too much processor time."""
+    """Raised if a run takes too much processor time."""
 
 
 @dataclass(eq=False)
 class Posed:
-    """A hard case with its problem, made once, and the reference's run of it (``truth``: positions and frames).
+    """A hard case with its problem, which is made once, and with the positions and frame numbers of the reference (``truth``).
 
-    ``in_steps``: the reference also solves up to its farthest frame in several numbers of load steps, even if the case does not
-    request this; ``jitters``: the number of other meshes on which the reference also runs.
+    ``in_steps``: the reference is also solved up to its farthest frame in several numbers of load steps, even if the case does not
+    request this. ``jitters``: the number of jittered meshes on which the reference is also solved.
     """
 
     hard: Hard
@@ -60,11 +61,11 @@ class Posed:
 
     @cached_property
     def problem(self) -> CaseProblem:
-        """The problem; InputError if the case is invalid."""
+        """The problem of the case. Raises InputError if the case is invalid."""
         if self.hard.block is not None:
             return blocks.several(self.hard) if self.hard.beside else blocks.problem(self.hard)
         shipped = self.hard.shipped
-        assert shipped is not None  # a Hard record has one of the two
+        assert shipped is not None  # a Hard record has either a block or a shipped case
         case = shipped.read()
         return of_case.problem(case, of_case.setup(case))
 
@@ -77,9 +78,10 @@ def run(
     in_steps: bool = False,
     jitters: int = 0,
 ) -> Stress:
-    """Run every solver, or ``only`` the named ones, and the user's ``own`` on each case, the reference first. ``in_steps`` and
-    ``jitters``: see ``Posed``. ``own`` has, for each solver, the effects that it models besides a law of the whole muscle, None
-    if these are unknown.
+    """Run every solver on each case, the reference first.
+
+    ``only``: the names of the solvers of this package that run, by default all. ``own``: the user's solvers, each with the effects
+    that it models in addition to a law of the whole muscle, None if these are unknown. ``in_steps``, ``jitters``: see ``Posed``.
     """
     begin, clock, cells = time.perf_counter(), MachineTime.now(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
@@ -99,8 +101,8 @@ def run(
 
 
 def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = None) -> Cell:
-    """The cell of a solver on a case; a failure is a verdict, never an exception. Not applicable if the solver leaves out an
-    effect: ``takes`` lists the effects that it models besides a law, None if unknown.
+    """Run a solver on a case, and return the cell with its verdict; a failure is a verdict, never an exception. ``takes``: the
+    effects that the solver models in addition to a law, None if unknown; a case with another effect is not applicable.
     """
     begin = time.perf_counter()
     hard, solver = posed.hard, choice.solver
@@ -136,8 +138,10 @@ def cell(posed: Posed, choice: SolverChoice, takes: Collection[str] | None = Non
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """Raise _Late after ``seconds`` of this process's processor time, and StalledError after ``CLOCK`` times as much clock time,
-    both only in the main thread, and repeatedly, as Python may lose an exception; processes of the reference have their own limit.
+    """Raise _Late after ``seconds`` of processor time of this process, and StalledError after ``CLOCK`` times as much clock time.
+
+    Both limits apply only in the main thread. The exceptions are raised repeatedly, because Python may lose one. Processes of the
+    reference have a limit of their own.
     """
 
     def late(*_: object) -> None:
@@ -164,9 +168,9 @@ def _limited(seconds: float) -> Iterator[None]:
 
 
 def _solved(posed: Posed, choice: SolverChoice) -> Cell:
-    """The cell of a solver that attempts the case."""
+    """Solve the case, and return the cell with its verdict."""
     hard, solver = posed.hard, choice.solver
-    if posed.problem.field is not None:  # settings for bodies do not matter for a field
+    if posed.problem.field is not None:  # the default settings are for bodies, not for fields
         choice = SolverChoice(**{"solver": solver, **hard.settings.get(solver, {})})
     outcome, followed = follow(posed.problem, choice)
     if solver == REFERENCE and posed.problem.field is None and outcome.status == "converged":
@@ -182,7 +186,7 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
 
 
 def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
-    """The cell of a run, judged by the quantities that the case bounds."""
+    """Judge a run by the quantities that the case bounds, and return the cell ``blank`` with the verdict."""
     known = [bound for bound in hard.bound if bound.quantity != "from_reference" or followed.truth is not None]
     histories = [(bound, health.history(followed, bound.quantity)) for bound in known]
     begins = followed.least_determinant
@@ -195,11 +199,12 @@ def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
 
 
 def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Followed) -> Iterator[SameEnd]:
-    """Comparisons of the reference's run with others: in other numbers of load steps, and on other meshes."""
+    """Comparisons of the reference's run with runs in other numbers of load steps, and with runs on jittered meshes."""
     hard, built = posed.hard, mechanical(posed.problem)
     if built is None or choice.solver != REFERENCE:
         return
-    asked = posed.in_steps and hard.start is None and not built.body.rubs  # with friction the end depends on the path
+    # With friction the end state depends on the load path.
+    asked = posed.in_steps and hard.start is None and not built.body.rubs
     wanted = hard.steps or (following.farthest(followed) if asked else None)
     if wanted is not None:
         yield following.in_steps(built, choice, wanted)
@@ -209,7 +214,9 @@ def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Fo
 
 
 def _scene(found: Cell, followed: Followed) -> Scene | None:
-    """The decisive frame (the last one of an unfinished run), with the position in its message; None without a finite surface."""
+    """The surface at the decisive frame (the last frame of an unfinished run), with the decisive point or the point that the
+    message names. None if the surface is empty or not finite.
+    """
     ended = found.status != "converged"
     i = len(followed.positions) - 1 if ended else found.at
     points, history = followed.positions[i], found.history
