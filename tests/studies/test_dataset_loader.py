@@ -8,10 +8,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from fem_reference.studies import dataset_loader
 
 
+@pytest.mark.slow
 def test_as_a_command_it_counts_frames_and_checks_every_file(tmp_path: Path) -> None:
     hashes = {}
     for name in ("a", "b"):
