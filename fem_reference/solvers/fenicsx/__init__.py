@@ -104,9 +104,7 @@ def _solve(problem: AnyMuscle, settings: Settings, sink: Sink, kept: Kept | None
     if outcome.status != "converged" and body.frames[0] < body.first and not passed:
         begin = "while an overlap at rest was removed, before the first frame (which shows the given rest state)"
         outcome = replace(outcome, message=f"{begin}: {outcome.message}")
-    key = (
-        " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""
-    )  # the key that sets the size in a scene
+    key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # the key in a scene
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
 
 

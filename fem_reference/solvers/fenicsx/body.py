@@ -173,8 +173,8 @@ class AssembledBody:
         self.go_back(before)
 
     def recall(self, frame: float) -> bool:
-        """Restore an earlier state with the loads and boundary conditions of ``frame`` and return True, if there is one, its residual
-        confirms equilibrium, and no jump leads to it (after a full turn the loads are those at rest, but the state differs).
+        """Restore an earlier state with the loads and boundary conditions of ``frame`` and return True, if there is one, its
+        residual confirms equilibrium, and no jump leads to it (after a full turn the loads are those at rest, but the state differs).
         """
         if self.clock.matters or not self.reuse:
             return False
