@@ -174,7 +174,7 @@ class AssembledBody:
 
     def recall(self, frame: float) -> bool:
         """Restore an earlier state with the loads and boundary conditions of ``frame`` and return True, if there is one, its
-        residual confirms equilibrium, and no jump leads to it (after a full turn the loads are those at rest, but the state differs).
+        residual confirms equilibrium, and no jump leads to it (after a full turn the loads are those at rest, but not the state).
         """
         if self.clock.matters or not self.reuse:
             return False
