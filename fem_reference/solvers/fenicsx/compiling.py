@@ -81,9 +81,7 @@ def form(expression: Any) -> Any:
 
 
 class _Code(NamedTuple):
-    """A compiled expression, its ``module``, and the indices in its formula's lists of the ``functions`` and ``constants`` it
-    reads.
-    """
+    """A compiled expression, its ``module``, and the indices of the functions and constants it reads in the formula's lists."""
 
     expression: Any
     module: Any

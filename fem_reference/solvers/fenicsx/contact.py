@@ -276,8 +276,7 @@ class ContactForces:
 
     def _through(self, i: int) -> tuple[float, str] | None:
         """The excess depth [mm] of the point that went farthest through bone ``i`` since the last settled state, and a message;
-        None without such a point. The point's straight path in the bone's frame is deeper inside than both ends and leaves on the
-        far side.
+        None without such a point. Its straight path in the bone's frame is deeper inside than both ends and leaves on the far side.
         """
         _, settled_at, settled = self.settled
         there, here = partial(self._local, i, settled_at, settled), partial(self._local, i, self.frame, self.moved)

@@ -26,8 +26,7 @@ _BALL = 1.25  # the radius of a ball around a facet, over the largest distance o
 class FacetPlaces:
     """Points on n facets. ``at`` (n, 2): reference coordinates; ``basis`` (n, k) and ``slopes`` (n, 2, k): the values and
     derivatives of the nodes' basis functions; ``point`` (n, 3) [mm]: positions; ``tangents`` (n, 2, 3) [mm]: derivatives of the
-    positions; ``normal`` (n, 3): outward unit normals; ``bend`` (n, 2, 2) [mm]: second derivatives of the positions along the
-    normals.
+    positions; ``normal`` (n, 3): outward unit normals; ``bend`` (n, 2, 2) [mm]: second derivatives along the normals.
     """
 
     at: Floats

@@ -133,8 +133,7 @@ class Factorised:
 
     def negative_pivots(self) -> int:
         """The number of negative pivots of the current matrix, which is factorised if necessary. If single precision does not
-        resolve the softest directions, double precision is used from then on. Raises ``LinearSolveError`` if the matrix cannot be
-        factorised.
+        resolve the softest directions, double precision is used from then on. Raises ``LinearSolveError`` on failure.
         """
         if not self.fresh:
             self.factorise()

@@ -72,8 +72,7 @@ def geometry(msh: mesh.Mesh, points: Floats, cells: Ints | slice) -> tuple[Float
 @dataclass(frozen=True, eq=False)
 class Tabulated:
     """Interpolation of some of the unknowns to reference points of cells. ``values`` (q, k): the basis functions at the points;
-    ``slopes`` (3, q, k): their derivatives along the reference coordinates; ``unknowns`` (m, k, c): the unknowns of the cells'
-    nodes.
+    ``slopes`` (3, q, k): their derivatives along the reference coordinates; ``unknowns`` (m, k, c): those of the cells' nodes.
     """
 
     values: Floats

@@ -62,8 +62,7 @@ def _displacements(body: AssembledBody, mode: PETSc.Vec) -> Floats:
 
 def leave(body: AssembledBody, frame: float, share: float) -> float | None:
     """Perturb the current state, at ``frame``, along its lowest mode by ``share`` times the size of the body and solve again, until
-    there are fewer negative modes. Returns the perturbation [mm]; None if the state is stable or no other state is found.
-    Collective.
+    there are fewer negative modes. Returns the perturbation [mm]; None if the state is stable or no other is found. Collective.
     """
     if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
         return None

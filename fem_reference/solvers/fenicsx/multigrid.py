@@ -59,9 +59,7 @@ class Multigrid:
         return False
 
     def _renew(self) -> None:
-        """Build the preconditioner: it finds the pressure from the volume residual, then the displacement from the remaining
-        forces.
-        """
+        """Build the preconditioner. It solves for the pressure first, then for the displacement from the remaining forces."""
         with self.spent.on("factorisation"):
             kinds: Any = PETSc.PC  # the stubs declare its members as numbers
             blocks = PETSc.PC().create(self.matrix.comm)

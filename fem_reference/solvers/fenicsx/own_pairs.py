@@ -49,9 +49,7 @@ class OwnPairs:
 
 
 def pairs(points: Floats, middles: Floats, reach: Floats) -> tuple[Ints, Ints]:
-    """The points (p,) and facets (p,) of all pairs in which the point is within ``reach`` (m,) [mm] of the facet's centre
-    ``middles`` (m, 3).
-    """
+    """Pairs of points (p,) and facets (p,), the point within ``reach`` (m,) [mm] of the facet's centre (``middles``, (m, 3))."""
     low, high = (middles - reach[:, None]).min(axis=0), (middles + reach[:, None]).max(axis=0)
     near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
     if not len(near):

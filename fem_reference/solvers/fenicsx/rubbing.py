@@ -107,9 +107,7 @@ class Rubbing:
         self.facets[met.points], self.at[met.points], self.settled = met.facets, held, np.array(unknowns)
 
     def rubbed(self, met: Met, unknowns: Floats) -> Rubbed:
-        """Friction of points that ``met`` facets: ``-min(k |e|, friction p) e / |e|``, with the elastic slip e in the current
-        metric.
-        """
+        """Friction of points that ``met`` facets: ``-min(k |e|, friction p) e / |e|``, e the elastic slip in the current metric."""
         tables = self.other.element.tabulate(3, met.there.at)[..., 0]
         place, whole, elastic, change = self._slipped(met, unknowns, tables)
         covector = np.einsum("nab,nb->na", place.metric, elastic)
@@ -155,8 +153,7 @@ class Rubbing:
 
     def _starts(self, met: Met) -> tuple[Floats, Floats, Floats]:
         """The facet coordinates (n, 2) from which the points slip, the fraction (n,) of the path from there that counts as slip,
-        and the derivative (n,) of the fraction by the gap. A point new in contact slips from where its path comes within the
-        smoothing.
+        and the derivative (n,) of the fraction by the gap. A point new in contact slips from where its path enters the smoothing.
         """
         at, share, by_gap = self.at[met.points], np.ones(len(met.gap)), np.zeros(len(met.gap))
         moved = np.flatnonzero(self.facets[met.points] != met.facets)

@@ -73,8 +73,7 @@ class TouchingForces:
     @staticmethod
     def _passes(body: Body, form: Form, displacement: Displacement) -> tuple[list[Pass], list[Pass | None]]:
         """Two passes for each law, one from each side (a single one if a part touches itself); and for each pass the skin around
-        the other part, which the points of the pass must not touch. The skin is None if there is none or it takes part in the
-        contact.
+        the other part, which the points of the pass must not touch. It is None if there is none or it takes part in contact.
         """
         both = ((law, dict.fromkeys(((law.one, law.other), (law.other, law.one)))) for law in body.touching)
         sides = [(law, *pair) for law, pairs in both for pair in pairs]
@@ -155,8 +154,7 @@ class TouchingForces:
         """The maximum ``touching_depth`` [mm] and ``touching_pressure`` [MPa] of all points; with several laws, the maximum
         pressure of each law (``Touching.pressure_name``); ``touching_area`` [mm2], the undeformed area under pressure, averaged
         over both sides; ``touching_points``, the number of points under pressure; ``touching_overlap_at_rest`` [mm], the depth of
-        the deepest point at rest, if the overlap is removed; and ``touching_friction_work`` [N mm], dissipated by friction since
-        the start.
+        the deepest point at rest, if the overlap is removed; and ``touching_friction_work`` [N mm], dissipated since the start.
         """
         self.look()
         pairs = list(zip(self.passes, self.now, strict=True))
