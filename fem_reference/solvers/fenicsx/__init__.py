@@ -125,7 +125,7 @@ def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
             others = tuple(name for name in names if name != span.name)
             part = frame_of(frame, span, others)
             one = each[span.name](part, is_first=is_first)
-            assert part.state is not None  # of a muscle
+            assert part.state is not None  # a muscle's frame has a state
             own[f"{span.name}.volume_ratio"] = volume_ratio(problem.problems[span.name].mesh, part.state)
             new = {key: value for key, value in one.scalars.items() if key not in frame.scalars}
             for other in others:
@@ -161,7 +161,7 @@ def _loads(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
     [N mm]. Both are computed from the deformed shape alone, without the solver's forms.
     """
     state = frame.state
-    assert state is not None  # of a muscle
+    assert state is not None  # a muscle's frame has a state
     by, since = quadratic(state.displacement), state.displacement - state.before if len(state.before) else None
     load = external_load(problem, frame.number, by, None if since is None else state.rate * quadratic(since))
     assert load is not None  # ``_are_known`` ensures it
@@ -187,7 +187,7 @@ def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: b
     for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):
         pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(list(vectors.values()), axis=0)))
         pulls |= _on_bones(problem, kind, vectors)
-    assert frame.state is not None  # of a muscle
+    assert frame.state is not None  # a muscle's frame has a state
     results = Results(problem.mesh, problem.effects, {frame.number: frame.state}, problem.directions, problem.regions)
     own = pulls | _attachment_errors(problem, frame) | stress_scalars(results, frame.number)
     return replace(frame, note=note, scalars=scalars | own)

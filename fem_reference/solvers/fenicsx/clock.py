@@ -23,7 +23,7 @@ class Clock:
     def __init__(self, body: Body, step: TimeStep | None) -> None:
         self.step, self.interval, self.at, self.first = step, body.interval, body.frames[0], body.first
         self.whole = body.frames[-1] - body.frames[0]
-        # An effect with momentum, such as inertia, has the formulas of its time integration.
+        # An effect with momentum, such as inertia, contains the formulas for its time integration.
         self.momentum: Any = next((one for one in body.effects if "momentum" in one.needs), None)
         size = 0 if step is None or self.momentum is None else len(step.before.x.array)
         self.velocity, self.acceleration = np.zeros(size), np.zeros(size)
@@ -57,7 +57,7 @@ class Clock:
 
     def begin(self, unknowns: Floats) -> None:
         """End the step that ``instant`` started, with ``unknowns``. The velocities are 0, and the accelerations are now known."""
-        assert self.step is not None  # there is momentum
+        assert self.step is not None  # an effect has momentum
         moved = unknowns - self.step.before.x.array
         self.acceleration, self.resting = self.momentum.begun(moved, 1 / float(self.step.rate.value)), False
 

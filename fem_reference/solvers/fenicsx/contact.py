@@ -249,7 +249,7 @@ class ContactForces:
         return Trouble("diverged", why) if why else None
 
     def _yielded(self) -> list[tuple[float, str]]:
-        """For each bone with a pressed point so deep that it could leave on any side: depth / half-thickness, a message."""
+        """The bones with a pressed point so deep that it could leave on any side: its depth over half the thickness, a message."""
         mine, allowed = list[tuple[float, str]](), self.law.allowance(self.frame)
         for entry, one, before in zip(self.bones, self.now, self.overlaps, strict=True):
             depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))
@@ -259,7 +259,7 @@ class ContactForces:
         return mine
 
     def _from_afar(self) -> list[tuple[float, str]]:
-        """For each bone that points met, with friction, from so far away that their slip is unknown: the number and a message."""
+        """The bones with friction that points met from so far away that their slip is unknown: the number of points, a message."""
         mine = list[tuple[float, str]]()
         for i, friction in enumerate(self.friction):
             pressed = self.now[i].pressed

@@ -134,7 +134,7 @@ class Facets:
         return np.tile(self.element.points.mean(axis=0), (len(which), 1)), np.arange(len(which))
 
     def _moved(self, at: Floats, going: Ints, step: Floats, iteration: int) -> Ints:
-        """Move the entries ``going`` (k,) of ``at`` (n, 2) by a ``step`` (k, 2), shortened if long; return those not yet done."""
+        """Move the entries ``going`` (k,) of ``at`` (n, 2) by a ``step`` (k, 2), shortened if long; return the unfinished ones."""
         longest = np.abs(step).max(axis=1)
         at[going] += step * (_LONGEST / np.maximum(longest, _LONGEST))[:, None]
         return going[(longest > _SMALL) & ((iteration < _ROUGH) | (self.beyond(at[going]) < _LONGEST))]

@@ -96,7 +96,7 @@ class Form:
         self.stretched: Any = ufl.derivative(stretched, unknowns) if stretched else 0
 
     def set_amounts(self, frame: float) -> None:
-        """Set the amounts of effects at a frame, and select the derivatives without the effects that are left out there."""
+        """Set the amounts of effects at a frame, and select the derivatives without the effects that are left out at this frame."""
         for effect, amount in zip(self.effects, self.amounts, strict=True):
             amount.value = effect.amount(frame)
         self.derivatives = self._made[self._quiet(frame)]

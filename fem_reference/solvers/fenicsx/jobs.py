@@ -55,8 +55,8 @@ class Job:
 
     ``samples``: by name, the cells (n,) and the rest positions (n, 3) of points whose positions are requested. Only a muscle has
     samples; forces at edges shared by attachments are then divided between the attachments. ``kept``: stored states, or None.
-    Raises InputError if stable states are to be followed with friction or with contact along own normals, as negative modes are not
-    counted then.
+    Raises InputError if stable states are to be followed with friction or with contact along the points' own normals, as negative
+    modes are not counted then.
     """
 
     body: Body

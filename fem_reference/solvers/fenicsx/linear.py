@@ -17,7 +17,7 @@ _COMPRESSED_FROM, _COMPRESSION, _DROPPED = 80_000, 35, 7
 # The cost of a back-substitution per entry of the factors, in operations of a factorisation (measured at 16 000 and 200 000
 # unknowns).
 _OPERATIONS = 22.0
-_LEAST, _MOST = 12, 80  # bounds of the number of Krylov iterations for which an old factorisation is kept
+_LEAST, _MOST = 12, 80  # bounds of the number of Krylov iterations for which an old factorisation is reused
 _INVERSE_ITERATIONS, _RESOLVED = 4, 0.1  # for the test of single precision
 _EXACT = 1e-10  # the relative residual of an exact solution, with which Newton's method converges quadratically
 _number = count()
@@ -57,7 +57,7 @@ class Factorised:
         self._choose(precision)
         self.factorised: int | None = None  # PETSc's count of changes of the matrix when it was last factorised
         self.limit = _LEAST
-        self.since = 0  # Krylov iterations since the last factorisation, with a changed matrix
+        self.since = 0  # Krylov iterations with a changed matrix since the last factorisation
 
     def _choose(self, precision: str) -> None:
         self.precision, self.entries = precision, self.matrix.getInfo()["nz_used"]

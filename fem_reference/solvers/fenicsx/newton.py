@@ -12,7 +12,7 @@ from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.system import System
 
-# A step is halved until det F keeps this fraction of its value at every point, or the step is below this fraction of the full step.
+# A step is halved until det F keeps _KEPT times its value at every point, or the step is shorter than _SHORTEST times a full step.
 _KEPT, _SHORTEST = 0.1, 1e-2
 # Eisenstat and Walker 1996 (doi 10.1137/0917003), choice 2: the tolerance of the first linear system, then the factor of later
 # tolerances and their bounds.
@@ -125,7 +125,7 @@ class Newton:
         if norm == 0 or last == 0:
             return _FIRST
         wanted = _FIRST if np.isnan(last) else float(np.clip(_FACTOR * (norm / last) ** 2, _TIGHTEST, _LOOSEST))
-        # In linear systems the residual of a pressure is multiplied by the unit of pressure.
+        # In linear systems the residual of a pressure is multiplied by the scale of the pressure.
         enough = self.residual * min(1.0, self.system.tangent.unit)
         if wanted * norm < enough:
             wanted = min(wanted, _PAST * enough / norm)

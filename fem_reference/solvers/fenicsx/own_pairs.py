@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx.facets import Facets
 
-# Two facets do not face each other if the cosine of the angle between their normals in the middle is above this value. Below it,
+# Two facets do not face each other if the cosine of the angle between their normals at their centres is above this value. Below it,
 # they may face each other at some points, because facets are curved.
 _ALIKE = 0.5
 
@@ -44,7 +44,7 @@ class OwnPairs:
         return one[apart], other[apart]
 
     def _normals(self, nodes: Floats) -> Floats:
-        """The normals (m, 3) in the middle of the facets, whose ``nodes`` (m, k, 3) [mm] are given."""
+        """The normals (m, 3) at the centres of the facets, whose ``nodes`` (m, k, 3) [mm] are given."""
         return self.facets.places(nodes, np.arange(self.count), np.full((self.count, 2), 1 / 3)).normal
 
 

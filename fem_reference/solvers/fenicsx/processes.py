@@ -49,7 +49,7 @@ def require_installed() -> None:
 
 
 def mpiexec() -> str | None:
-    """The wheel's own ``mpiexec`` next to the interpreter, otherwise one on the PATH, perhaps of another MPI; None without any."""
+    """The wheel's own ``mpiexec`` next to the interpreter, otherwise one on the PATH, perhaps of another MPI; None if missing."""
     beside = Path(sys.executable).with_name("mpiexec")
     return str(beside) if beside.exists() else shutil.which("mpiexec")
 
@@ -167,7 +167,7 @@ class Process:
         self.process.wait()
 
     def end(self) -> None:
-        """End the process at once."""
+        """End the process immediately."""
         self._stop()
         self.listener.join()
         for stream in (self.input, self.output, self.error_output):

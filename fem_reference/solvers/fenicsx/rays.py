@@ -183,7 +183,7 @@ class RayPass(Pass):
         return some[kept], facets[kept], here[np.flatnonzero(kept)]
 
     def _ends(self, at: Floats, gap: Floats, facets: Ints) -> tuple[Floats, Floats, Floats]:
-        """The fraction (n,) of the pressure that acts beyond edges; its derivatives by the coordinates (n, 2) and the gap (n,)."""
+        """The fraction (n,) of the pressure that acts beyond edges, its derivatives by coordinates (n, 2) and by the gap (n,)."""
         size, (beyond, leaving) = _SHALLOW * self.other.balls(self.other.rest)[1][facets], self.other.leaving(at)
         (wide, by_place), (shallow, by_gap) = _step(1 - beyond / _WIDE), _step(2 + 2 * gap / size)
         out = beyond > _ON
@@ -219,7 +219,7 @@ class RayPass(Pass):
         return PressedPoints(self._dofs(met), by.rows, pull, areas[:, None, None] * second, pull[:, :3])
 
     def shaded(self, met: Hits) -> PressedPoints:
-        """The change of the forces beyond edges with the shades that take a share of them: a tangent without forces."""
+        """The change of the forces beyond edges when their shades move: a tangent without forces."""
         of, shades = met.shades.of, met.shades
         here, there = met.here[of], met.there[of]
         hit, shade = changes(here, there, met.gap[of]), changes(here, shades.there, shades.gap)

@@ -21,8 +21,8 @@ class BodySettings(Record):
 
     ``linear_solver``: ``"direct"`` factorises each system. ``"lagged"`` uses inexact FGMRES, preconditioned with a factorisation
     that is reused until a new one is cheaper; before a run ends ``out of steps``, it is continued with exact solutions.
-    ``"multigrid"`` uses FGMRES with two levels of elements. The default depends on the size. ``precision`` of factorisations: by
-    default double for ``"direct"`` and single for ``"lagged"``. Both settings change the time but not the result.
+    ``"multigrid"`` uses FGMRES with two levels of elements. The default depends on the size. ``precision``: the precision of
+    factorisations, by default double for ``"direct"`` and single for ``"lagged"``. Both settings change the time, not the result.
 
     ``follow``: ``"equilibrium"`` accepts any equilibrium that Newton's method finds. With ``"stable"``, if the equilibrium of a
     frame is unstable (and negative modes are counted), the body is moved along its lowest mode by a ``perturbation``, a fraction of

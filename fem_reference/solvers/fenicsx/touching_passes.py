@@ -31,8 +31,8 @@ _BULGE = 1.25  # a facet bulges from a plane at most this many times as far as i
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """The n ``points`` of one side that are near the other: their places ``here`` on their own facets ``own`` (n,), the nearest
-    places ``there`` on the other side's ``facets`` (n,), and the ``gap`` (n,) [mm] along the normal there, negative inside.
+    """The n ``points`` of one side that are near the other: their places ``here`` on their own facets ``own`` (n,), the places
+    ``there`` that they meet on the other side's ``facets`` (n,), and the ``gap`` (n,) [mm] along the normal there, negative inside.
     """
 
     points: Ints
@@ -102,9 +102,9 @@ class Pass:
 
     def met(self, unknowns: Floats, most: float, last: Met | None = None, settled: Settled | None = None) -> Met:
         """The points at gaps up to ``most`` [mm], each with the nearest facet that faces it, or with the facet that it met
-        ``last``. A facet is met to a depth of its radius and half the thickness of its part. In self-contact the body itself is
-        behind a facet; so a point counts only if, in the ``settled`` state (by default the current one), it was in front of the
-        facet, or in contact with the facet or a neighbour.
+        ``last``. A facet is met to a depth of its radius or half the thickness of its part, whichever is smaller. In self-contact
+        the body itself is behind a facet; so a point counts only if, in the ``settled`` state (by default the current one), it was
+        in front of the facet, or in contact with the facet or a neighbour.
         """
         nodes, points = self.other.nodes(unknowns), self.places(unknowns)
         middles, radii = self.other.balls(nodes)
@@ -179,7 +179,7 @@ class Pass:
         return np.vecdot(points[some] - middle.point[facets], middle.normal[facets]), bulge
 
     def pressure(self, met: Met) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] on points that ``met`` the other side, without that of overlaps at rest; its slope in the gap."""
+        """The pressure (n,) [MPa] on points that ``met`` the other side, without overlaps at rest, and its slope in the gap."""
         (whole, slope), shares = self.whole(met), self.shares(met)
         return shares * whole, shares * slope
 
@@ -244,7 +244,7 @@ class Pass:
         return self._passed_by(before, last, now, met.points, np.zeros(len(self.areas)))
 
     def _passed_by(self, before: Floats, last: Met, now: Floats, seen: Ints, deep: Floats) -> Ints:
-        """The points as in ``through``, without those ``seen`` and those up to ``deep`` (n,) [mm] behind a facet not faced."""
+        """The points as in ``through``, except those ``seen`` or up to ``deep`` (n,) [mm] behind a facet they do not face."""
         starts, ends = self.places(before), self.places(now)
         old, new = self.other.nodes(before), self.other.nodes(now)
         shift = (new - old).mean(axis=(0, 1))  # a common displacement changes nothing

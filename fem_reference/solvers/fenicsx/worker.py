@@ -1,4 +1,4 @@
-"""The solving process: it reads pickled jobs, marches each body through its frames, and reports every frame."""
+"""The worker process: it reads pickled jobs, marches each body through its frames, and reports every frame."""
 
 import gc
 import pickle
@@ -27,7 +27,7 @@ from fem_reference.solvers.common.load_steps import Attempt, Step, StepSizes, ma
 
 
 _COUNTED = ("factorisations", "factorisation_flops", "krylov_iterations", "halved_steps")
-_numbers = count()  # of reports
+_numbers = count()  # of the reports
 
 
 class Worker:
