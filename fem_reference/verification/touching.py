@@ -110,7 +110,7 @@ ENTRIES = (
             **control("contact 1 % stiffer", stiffness=1.01 * BLOCK_STIFFNESS),
             truth=partial(contact.in_series, SOFT, BLOCK_STIFFNESS, TRAVEL),
             within=2e-4,
-            because="quadrature on one mesh is not exact for functions of the other: errors of 6e-5 in force, 2 % in pressure",
+            because="quadrature on one mesh is not exact for functions on the other: errors of 6e-5 in force, 2 % in pressure",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
         )
         for name, words in (("blocks_p2_p1", ""), ("blocks_as_one", ", as one surface that touches itself"))
@@ -120,7 +120,7 @@ ENTRIES = (
         "An elastic ball pressed against a large body of the same material: {}",
         ball,
         known_ball,
-        "discretisation and overlap add about 1 %, strains of 0.1 and the finite size of the bodies less",
+        "discretisation and overlap add about 1 %; strains of 0.1 and the finite size of the bodies add less",
         READINGS,
     ),
 )

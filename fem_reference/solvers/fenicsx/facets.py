@@ -89,7 +89,7 @@ class Facets:
         of the facets.
 
         Facets are continued beyond their edges; nearest points far beyond the edges are only approximate. Where the method does not
-        converge, ``at`` is set far beyond the edges, as the point would otherwise seem to be near a facet that is far from it.
+        converge, ``at`` is set far beyond the edges, so that the point does not seem to be near a facet far from it.
         """
         at, going = self._middles(which)
         for i in range(_ITERATIONS):

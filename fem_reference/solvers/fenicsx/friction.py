@@ -37,7 +37,7 @@ class Friction:
 
     def grip(self, which: Ints, here: Floats, gaps: Sampled, before: Before) -> Grip:
         """The friction of the pressed points ``which`` (n,) at positions ``here`` (n, 3) [mm] in the frame of the bone. ``gaps``:
-        the gaps and their derivatives there.
+        the gaps there, with derivatives; ``before``: a function, see ``Before``.
 
         The elastic slip e is the vector from the anchor to the point, without its component along the unit normal n. The traction
         is ``-min(k |e|, friction p) e/|e|``. A point that has come into contact since the settled state slips from the position at

@@ -14,7 +14,7 @@ _ALIKE = 0.5
 
 
 class OwnPairs:
-    """Finds pairs of facets that are near each other, among the ``facets`` of one part of a surface."""
+    """Finds pairs of nearby facets among the ``facets`` of one part of a surface."""
 
     def __init__(self, facets: Facets) -> None:
         self.facets, self.count = facets, len(facets.rest)
@@ -27,7 +27,7 @@ class OwnPairs:
         return np.asarray(self.next_to[one, other]).ravel() if len(one) else np.zeros(0, bool)
 
     def near(self, balls: tuple[Floats, Floats], reach: Floats, *states: Floats) -> tuple[Ints, Ints]:
-        """The two facets (p,) and (p,) of each pair that face each other in one of the ``states`` and share no node.
+        """Pairs of facets (p,) and (p,) that face each other in one of the ``states`` and share no node.
 
         ``balls``: the centres (m, 3) and radii (m,) [mm] of balls around the facets. The ball of the first facet of a pair comes
         within ``reach`` (m,) [mm] of the centre of the second facet. ``states``: positions (m, k, 3) [mm] of the nodes.
