@@ -134,7 +134,7 @@ class Pass:
         return found.some(order[np.unique(found.points[order], return_index=True)[1]])
 
     def _outside(self, some: Ints, facets: Ints, settled: Settled) -> tuple[Ints, Ints]:
-        """In self-contact, only pairs of points and facets in which the point was in front of the facet or in contact there."""
+        """Keep, in self-contact, only pairs in which the point was in front of the facet or in contact with it or a neighbour."""
         if self.own is None:
             return some, facets
         unknowns, then = settled
