@@ -1,4 +1,4 @@
-"""Bent and twisted bodies: a block bent into a tube sector, a cylinder twisted by a finite and a square bar by a small angle."""
+"""Bent and twisted bodies: a block bent into a sector of a tube, a cylinder twisted by 0.5 rad, and a slightly twisted bar."""
 
 from collections.abc import Callable
 from functools import partial
@@ -16,7 +16,7 @@ from fem_reference.runs.store import Frame
 from fem_reference.verification.parts import SLOW, clamped, control, find, mooney_rivlin, neo_hooke, sliding
 
 rivlin = find("rivlin")
-# [MPa]; C1 and C2 make a Mooney-Rivlin law with the shear modulus MU. The true values are those of an incompressible material.
+# Moduli [MPa]; C1 and C2 give a Mooney-Rivlin law with the shear modulus MU. The true values are for incompressible material.
 MU, BULK = 0.01, 1e4
 C1, C2 = 0.003, 0.002
 # The block [mm], and the angle [rad] between its ends when it is bent; its curved faces then have radii of 15.7 and 25.4 mm.
@@ -37,7 +37,9 @@ def flexed(thickness: float, length: float, angle: float, points: Floats, frame:
 
 
 def bent(lab: Lab, n: int, reading: str, element: str, mu: float = MU, faces: tuple[str, ...] = ("z0", "z1")) -> float:
-    """A reading of the half y >= 0 of the block in 2n by 2n by 1 cells, whose lateral ``faces`` stay plane; ``mu`` [MPa]."""
+    """A ``reading`` of the bent block, of which the half y >= 0 is solved in 2n by 2n by 1 cells. Its lateral ``faces`` stay plane;
+    ``mu`` [MPa].
+    """
     mesh = shapes.box((2 * n, 2 * n, 1), (THICKNESS, LENGTH / 2, WIDTH), ELEMENTS[element][0], 2)
     end = Prescribed("y1", "y1", (0, 1, 2), partial(flexed, THICKNESS, LENGTH, ANGLE))
     body = Body(mesh, neo_hooke(mu, BULK), (*sliding("y0"), end, *sliding(*faces)), (0.0, 1.0))
@@ -45,7 +47,7 @@ def bent(lab: Lab, n: int, reading: str, element: str, mu: float = MU, faces: tu
 
 
 def circle(points: Floats) -> float:
-    """The radius of the circle ``x^2 + y^2 = 2 a x + 2 b y + c`` nearest to ``points`` (n, 2), [mm].
+    """The radius [mm] of the circle ``x^2 + y^2 = 2 a x + 2 b y + c`` fitted to ``points`` (n, 2) [mm] by least squares.
 
     >>> round(circle(np.array([[3.0, 1.0], [1.0, 3.0], [-1.0, 1.0]])), 12)
     2.0
@@ -56,7 +58,9 @@ def circle(points: Floats) -> float:
 
 
 class Reading(NamedTuple):
-    """A quantity in ``words``, its ``unit``, its value from nodes at rest (n, 3) [mm] and the state (``read``), and its truth."""
+    """A quantity: its name in ``words``, its ``unit``, the function ``read`` that returns its value from the rest positions (n, 3)
+    [mm] of the nodes and a state, and its ``truth``.
+    """
 
     words: str
     unit: str
@@ -65,7 +69,7 @@ class Reading(NamedTuple):
 
 
 TRUE = rivlin.Flexure(MU, THICKNESS, LENGTH, ANGLE)
-# The moment on the end per width; the circle nearest to the nodes of the inner face; the distance between the curved faces.
+# The moment on the end per width; the radius of the circle fitted to the nodes of the inner face; the distance of the curved faces.
 READINGS = {
     "moment": Reading("the moment", "N", lambda _, state: float(state.moments["y1"][2] / WIDTH), TRUE.moment),
     "inner radius": Reading(
@@ -84,8 +88,10 @@ READINGS = {
 
 
 def twisted(lab: Lab, rings: int, end: str, element: str, material: tuple[Effect, ...], degree: int = 2) -> float:
-    """The moment [N mm] on the top of the cylinder about its axis, if ``end`` is "moments", or the force [N] along the axis, if it
-    is "forces". Both ends are turned by TWIST times their height and fixed there; with ``degree`` 1 cells are straight.
+    """The moment [N mm] about the axis on the top of the cylinder, if ``end`` is "moments", or the force [N] along the axis, if
+    ``end`` is "forces".
+
+    Both ends are rotated by TWIST times their height and held there. With ``degree`` 1 the cells are straight.
     """
     mesh = shapes.cylinder(RADIUS, TALL, rings, rings, ELEMENTS[element][0], degree)
     turn = Turn((0.0, 0.0, 1.0), TWIST, per_length=True)
@@ -95,8 +101,8 @@ def twisted(lab: Lab, rings: int, end: str, element: str, material: tuple[Effect
 
 
 def square_bar(lab: Lab, cells: int, element: str, turned: tuple[int, ...]) -> float:
-    """The torque per twist [N mm2]. A quarter of the bar is solved, as small displacements are antisymmetric about planes through
-    its axis. The displacements of its ends are prescribed along the axes ``turned``.
+    """The torque divided by the twist [N mm2]. Only a quarter of the bar is solved, as small displacements are antisymmetric about
+    planes through the axis. The displacements of the ends are prescribed along the axes ``turned``.
     """
     half = SIDE / 2
     mesh = shapes.box((cells, cells, 1), (half, half, SHORT), ELEMENTS[element][0])
@@ -116,7 +122,7 @@ MIXED = Refinement((1, 2, 3), THICKNESS / 2, order=None, note="no order: the err
 def flexure(
     name: str, reading: str, element: str, wrong: dict[str, Any], error: tuple[float, str], **more: Any
 ) -> Entry:
-    """A ``reading`` of the bent block; ``error``: the tolerance, and the error of the finest cells in words."""
+    """The entry for a ``reading`` of the bent block; ``error``: the tolerance, and the error with the finest cells in words."""
     cells, counts = CELLS[element]
     stated: dict[str, Any] = {"refinement": Refinement(counts, THICKNESS / 2, order=4)} | wrong | more
     return Entry(
@@ -153,7 +159,7 @@ OTHER_C2 = control("c2 is 1 % too large", material=mooney_rivlin(C1, 1.01 * C2, 
 def torsion(
     name: str, law: str, read: tuple[str, ...], wrong: dict[str, Any], error: tuple[float, str], **given: Any
 ) -> Entry:
-    """A quantity ``read`` of the twisted cylinder, on several meshes unless the number of ``rings`` is given."""
+    """The entry for a quantity ``read`` of the twisted cylinder, on several meshes unless the number of ``rings`` is given."""
     end, words, unit, truth = read
     material, true = TWISTED[law]
     cells, counts = CELLS[given["element"]]

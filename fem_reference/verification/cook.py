@@ -1,7 +1,7 @@
-"""Cook's membrane: a clamped, tapered panel in plane strain, under a shear load; nearly incompressible, bent and sheared at once.
+"""Cook's membrane: a tapered panel in plane strain, clamped at one side, that a shear load bends and shears.
 
-The panel is one layer of cells, whose two faces stay in their planes. The small strain solution is computed under a load so small
-that the response is linear, and is scaled up.
+Most panels are nearly incompressible. A panel is one layer of cells, whose two faces stay in their planes. The small-strain
+solution is computed under a load so small that the response is linear, and is then scaled up.
 """
 
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from fem_reference.verification.parts import SLOW, clamped, control, find, neare
 
 cook = find("cook")
 THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
-SMALL = 1e-5  # the fraction of the load at which the response is linear: second-order terms are about 1e-5 of it
+SMALL = 1e-5  # fraction of the load with a linear response; second-order terms are about 1e-5 of the response
 RESIDUAL = 1e-5  # at the full load of about 100 N [N, mm3]
 LOCKED = 0.5  # the panel locks if its tip reaches less than this fraction of the true displacement
 
 
 def _place(unit: Floats) -> Floats:
-    """Points (n, 3) [mm] of the panel from those of the unit cube, refined towards its four sides for the clamped corners."""
+    """Map points (n, 3) of the unit cube to the panel [mm], with smaller cells near its four sides for the clamped corners."""
     x, y = (3 * unit[:, :2] ** 2 - 2 * unit[:, :2] ** 3).T
     weights = np.stack([(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y], axis=1)
     return np.column_stack([weights @ np.array(cook.CORNERS), THICKNESS * unit[:, 2]])
@@ -33,7 +33,7 @@ def _place(unit: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Panel:
-    """The membrane ``name`` of ``validation.cook`` with an ``element``, under the fraction ``share`` of its load; its moduli are
+    """The membrane ``name`` of ``validation.cook`` with an ``element``, under the fraction ``share`` of its load. Its moduli are
     multiplied by ``shear`` and ``bulk`` (1: the true values).
     """
 
@@ -54,7 +54,7 @@ class Panel:
 
 
 def tip(lab: Lab, n: int, **panel: Any) -> float:
-    """The displacement [mm] of the corner (48, 60) of a :class:`Panel` of n by n cells along y, divided by its load fraction."""
+    """The displacement [mm] along y of the corner (48, 60) of a :class:`Panel` in n by n cells, divided by the load fraction."""
     made = Panel(**panel)
     body, first = made.body(n), 0.25 if made.share == 1 else 1.0
     state = lab.solve(body, made.element, first_step=first, residual=RESIDUAL * made.share).last
@@ -99,7 +99,7 @@ SMALL_STRAIN = control("small strain, linearly extrapolated from a tiny load", s
 def tip_entry(
     name: str, panel: dict[str, Any], element: str, wrong: dict[str, Any], stiff: tuple[float, str], **more: Any
 ) -> Entry:
-    """The tip of a ``panel`` with an ``element``; ``stiff``: the tolerance, and the excess stiffness in words."""
+    """The entry for the tip of a ``panel`` with an ``element``; ``stiff``: the tolerance, and the excess stiffness in words."""
     words, counts = CELLS[element]
     by, order = ("with linear cells", 2) if "1" in element[:2] else ("limited by the singular clamped corners", 1)
     stated = {"refinement": Refinement(counts, HEIGHT, order)} | wrong | more
@@ -126,7 +126,7 @@ ENTRIES: tuple[Entry, ...] = (
     tip_entry("nearly_incompressible", NEARLY, "P2/P1", LINEAR, (0.005, "0.16 %")),
     tip_entry("hexahedra", NEARLY, "Q2/Q1", STIFF, (0.001, "0.02 %"), slow=True),
     tip_entry("constant_pressure", NEARLY, "Q1/P0", LINEAR_HEXAHEDRA, (0.015, "0.5 %")),
-    tip_entry("stabilised", NEARLY, "P1/P1", LINEAR, (0.04, "22, 7.7 and 2.2 % in 8, 16 and 32 cells a side")),
+    tip_entry("stabilised", NEARLY, "P1/P1", LINEAR, (0.04, "22, 7.7 and 2.2 % with 8, 16 and 32 cells a side")),
     tip_entry("quarter_load", QUARTER, "P2/P1", SMALL_STRAIN, (0.005, "0.17 %"), slow=True),
     tip_entry("quarter_load_hexahedra", QUARTER, "Q2/Q1", STIFF, (0.001, "0.02 %"), **SLOW),
     tip_entry("full_load", FULL, "Q2/Q1", SMALL_STRAIN, (0.002, LEFT_OPEN), slow=True, refinement=SHORT),

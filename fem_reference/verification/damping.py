@@ -1,4 +1,4 @@
-"""Resistance to motion: viscous drag and viscosity of the matrix, in a steady motion and in a body that creeps back."""
+"""Resistance to motion: viscous drag and a viscous matrix, in steady motion and in bodies that creep back after unloading."""
 
 from functools import partial
 
@@ -24,12 +24,12 @@ LIGHT = 1e-6  # the weight [N/mm3] of the bar, which strains it by 1e-4
 ETA, VISCOUS_SECONDS = 0.02, 1.5  # viscosity of the blocks [MPa s], and time from one frame to the next [s]
 BULK = 1e6 * MU  # so high that the closed form for incompressible material holds to 1e-6
 STRESS = 3e-4 * MU  # a small load on the top of a block, which creeps back after its removal
-# Loads that are removed by frame 2.
+# A ramp to the full load at frame 1 and back to no load at frame 2.
 UP_AND_GONE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}, {"frame": 2.0, "amount": 0.0}]
 
 
 def velocity(lab: Lab, seconds: float) -> float:
-    """The velocity [mm/s] of a free block under its full weight, over four frames that are ``seconds`` apart."""
+    """The velocity [mm/s] of the fastest node of a free block under its full weight, over four frames ``seconds`` apart."""
     mesh = shapes.box((2, 2, 2), (1.0, 2.0, 3.0), "tetrahedron")
     acting = (*neo_hooke(MU, 100 * MU), weight(MUSCLE), make("damping", coefficient=DRAG))
     solved = lab.solve(Body(mesh, acting, (), (0, 1, 5), interval=seconds), "P2/P1", first_step=0.5, residual=1e-13)
@@ -38,7 +38,7 @@ def velocity(lab: Lab, seconds: float) -> float:
 
 
 def force(lab: Lab, n: int, eta: float) -> float:
-    """The force [N] of a smooth plate after it has moved down to half the height of a block in one frame, in n load steps."""
+    """The force [N] of a smooth plate after it has squeezed a block to half its height in one frame, with n load steps."""
     plate = Prescribed("plate", "z1", (2,), Affine(NO_GRADIENT, (0.0, 0.0, -0.5)))
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
     acting = (*neo_hooke(MU, BULK), make("viscosity", eta=eta))
@@ -47,7 +47,9 @@ def force(lab: Lab, n: int, eta: float) -> float:
 
 
 def relaxation_rate(solved: Run, numbers: tuple[int, int], seconds: float) -> float:
-    """The rate [1/s] at which the top of a body (its maximum z) returns to rest between two states, ``seconds`` apart."""
+    """The rate [1/s] at which the top of a body (its maximum z) returns to its rest position between the two states ``numbers``,
+    which are ``seconds`` apart.
+    """
     rest = solved.states[0].points[:, 2].max()
     ends = [solved.states[number].points[:, 2].max() - rest for number in numbers]
     return float(np.log(ends[0] / ends[1])) / seconds
@@ -75,7 +77,7 @@ def block_creep(lab: Lab, n: int, eta: float) -> float:
 
 
 def halved(counts: tuple[int, ...], seconds: float, name: str) -> Refinement:
-    """Load steps of ``seconds / count`` for the quantity ``name``, which implicit Euler integrates."""
+    """A refinement with load steps of ``seconds / count`` for the quantity ``name``, which implicit Euler integrates."""
     note = f"{name} by implicit Euler; sizes are load steps in seconds; the value is extrapolated from the last two"
     return Refinement(counts, seconds, order=1, extrapolated=True, note=note)
 
@@ -101,7 +103,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: -damping.terminal_velocity(MUSCLE * FREE_FALL, DRAG),
         within=1e-9,
         because="Implicit Euler and the element represent a steady motion exactly; the residual of 1e-13 N in each step is 2e-9 of "
-        "the weight of 6e-5 N, and only its sum over the nodes moves the block.",
+        "the weight of 6e-5 N, and only the sum of the residual over the nodes moves the block.",
         source="validation/damping.py, terminal_velocity",
     ),
     DAMPED(

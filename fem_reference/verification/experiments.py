@@ -1,4 +1,4 @@
-"""The shipped material compared with measured muscles, to which it is never fitted: it was chosen from other sources.
+"""The shipped material compared with measured muscles. It was chosen from other sources and never fitted to these measurements.
 
 An entry states whether the value lies within the uncertainty of the experiment; a value outside is a finding, not a failure. The
 value is pinned, so that a change of a law or of the material is noticed.
@@ -32,12 +32,12 @@ PINNED = {
 
 
 def measured(_: Lab, quantity: Quantity, material: Material) -> Finding:
-    """A quantity of a material, with the reason why the shipped material cannot reach the measured value."""
+    """The value of a ``quantity`` for a ``material``, with a note on why the shipped material cannot reach the measured value."""
     return Finding(quantity.of(material), note=f"Known limit: {quantity.limit}" if quantity.limit else "")
 
 
 def _control(name: str) -> tuple[str, Material]:
-    """The negative control of a quantity: in words, and the material."""
+    """The negative control of a quantity: its description and its material."""
     if name == "cube_softest_midway":
         return "Collagen across the fibres.", COLLAGEN
     return ("No fibres.", ISOTROPIC) if name == "cube_stiffest_across" else ("Shear modulus 10 % too high.", STIFFER)
@@ -58,7 +58,7 @@ def _entry(quantity: Quantity) -> Entry:
 def _of(
     quantity: Quantity, tried: tuple[Material, str, Material], pinned: float, source: str, *, from_memory: bool = True
 ) -> Entry:
-    """The entry of a quantity; ``tried``: the material, and the negative control in words and its material."""
+    """The entry for a quantity. ``tried``: the material, and the description and the material of the negative control."""
     return EXPERIMENT(
         name=quantity.name,
         title=quantity.title,

@@ -1,4 +1,4 @@
-"""Blocks of muscle whose fibres resist, contract or are prestretched; all homogeneous, so that finite elements are exact."""
+"""Blocks of muscle whose fibres resist, contract or are prestretched. All states are homogeneous, so finite elements are exact."""
 
 from dataclasses import replace
 from functools import partial
@@ -14,20 +14,20 @@ laws, fibre_laws = find("laws"), find("fibre_laws")
 
 
 def passive(stress: float = STRESS, linear_from: float = 1.4) -> Material:
-    """Blemker's passive fibres, ``stress`` [MPa]; slack up to ``OPTIMUM``."""
+    """Blemker's passive fibres with a ``stress`` [MPa], slack up to a stretch of ``OPTIMUM``."""
     numbers = {"p1": 0.05, "p2": 6.6, "optimal_stretch": OPTIMUM, "linear_from": linear_from}
     acting = make("fibre_passive", stress=f"{stress} MPa", **numbers)
     return Material((acting,), fibre_laws.FibrePassive(stress, *numbers.values()))
 
 
 def passive_febio(c4: float = 6.0, c5: float = 0.3) -> Material:
-    """FEBio's passive fibres, slack up to 1; ``c5`` [MPa]."""
+    """FEBio's passive fibres, slack up to a stretch of 1; ``c5`` [MPa]."""
     acting = make("fibre_passive_febio", c3="0.01 MPa", c4=c4, c5=f"{c5} MPa", linear_from=1.4)
     return Material((acting,), fibre_laws.FibrePassiveFebio(0.01, c4, c5, 1.4))
 
 
 def active(activation: float = 1.0, stress: float = STRESS) -> Material:
-    """Blemker's active fibres whose activation grows from 0 at frame 0 to ``activation`` at frame 1; ``stress`` [MPa]."""
+    """Blemker's active fibres, with an activation that grows from 0 at frame 0 to ``activation`` at frame 1; ``stress`` [MPa]."""
     acting = make("fibre_active", ramp=ramp(activation), stress=f"{stress} MPa", optimal_stretch=OPTIMUM)
     return Material((acting,), fibre_laws.FibreActive(stress, OPTIMUM, activation))
 
@@ -52,7 +52,7 @@ def taut(material: Material, stretch: float) -> Material:
 
 
 def muscle(fibres: Material, stretch: float) -> Specimen:
-    """Fibres along x in a neo-Hookean matrix, fixed at a stretch."""
+    """A block with fibres along x in a neo-Hookean matrix, held at a ``stretch``."""
     return Specimen(NEO + fibres, "P2/P1", "uniaxial", stretch)
 
 
@@ -78,7 +78,7 @@ ENTRIES = (
         )
         for name, law, (stretch, words), right, negative_control, wrong in (
             ("toe", "Blemker", TOE, passive(), STRONGER, passive(1.01 * STRESS)),
-            ("line", "Blemker", LINE, passive(), "The line begins at 1.45 instead of 1.4.", passive(linear_from=1.45)),
+            ("line", "Blemker", LINE, passive(), "Linear from a stretch of 1.45, not 1.4.", passive(linear_from=1.45)),
             ("febio_toe", "FEBio", TOE, passive_febio(), "The exponent c4 1 % too high.", passive_febio(c4=6.06)),
             ("febio_line", "FEBio", LINE, passive_febio(), "The slope c5 1 % too high.", passive_febio(c5=0.303)),
         )
@@ -88,7 +88,7 @@ ENTRIES = (
             "passive_slack",
             "Passive fibres (Blemker) that are shortened carry no force: force of the matrix alone",
             muscle(passive(), 0.8),
-            "The fibres run across, where the block widens.",
+            "The fibres lie across the block, which widens in their direction.",
             fibre=Y,
         ),
         truth=Specimen(NEO, "P2/P1", "uniaxial", 0.8).known_force,
@@ -136,7 +136,7 @@ ENTRIES = (
             f"two_families_{mode}",
             f"Two families of fibres (Holzapfel-Ogden) {words}: force along their mean direction",
             Specimen(FAMILIES, "P2/P1", mode, 1.25),
-            "Families at 31 instead of 30 degrees.",
+            "The families are at 31 instead of 30 degrees.",
             material=NEO + two_families(31.0),
         )
         for mode, words in (("uniaxial", "stretched midway between them"), ("equibiaxial", "stretched in their plane"))

@@ -17,14 +17,14 @@ from fem_reference.problems.touching import Touching
 from fem_reference.verification.contact import CONTACT
 from fem_reference.verification.parts import NO_GRADIENT, clamped, control, neo_hooke
 
-FRICTION, MU, BULK = 0.3, 0.01, 0.1  # coefficient, and moduli [MPa]
+FRICTION, MU, BULK = 0.3, 0.01, 0.1  # coefficient of friction, and moduli [MPa]
 WEIGHT, STIFFNESS, HEIGHT = 1e-4, 0.01, 0.5  # pressure under the block [MPa], contact stiffness [MPa/mm], height [mm]
 NEAR = (0.9, 0.99, 0.999, 0.9999, 1.0002, 1.001)  # tangents of the requested angles, as multiples of FRICTION
 LAW = ContactLaw("z0", STIFFNESS, 0.01, friction=FRICTION)
 
 
 def incline(lab: Lab, friction: float) -> Finding:
-    """The largest requested tangent at which a block under its weight still sticks to a plane that tilts below it."""
+    """The tangent of the largest requested angle at which a block under its weight still sticks to a plane that is tilted."""
     angles = tuple(float(np.arctan(share * FRICTION)) for share in NEAR)
     frames = (0.0, *(float(i) for i in range(1, 1 + len(NEAR))))
     turning = RigidMotion((0.0, 1.0, 0.0), (0.5, 0.5, 0.0), frames, (0.0, *angles))
@@ -42,7 +42,7 @@ def incline(lab: Lab, friction: float) -> Finding:
 
 
 def drag(lab: Lab, friction: float) -> Finding:
-    """The drag of a plate that slides over a clamped block, divided by its normal force."""
+    """The drag of a plate that slides over a clamped block, divided by the normal force."""
     above = ContactBone(
         "plate",
         HalfSpace((0.0, 0.0, HEIGHT - 0.005), (0.0, 0.0, -1.0)),
@@ -58,7 +58,7 @@ def drag(lab: Lab, friction: float) -> Finding:
 
 
 def blocks(lab: Lab, friction: float) -> Finding:
-    """The drag of a block that slides over a larger one with a non-matching mesh, divided by its normal force."""
+    """The drag of a block that slides over a larger block with a non-matching mesh, divided by the normal force."""
     low, high = (
         shapes.box(counts, size, "tetrahedron")
         for counts, size in (((4, 3, 1), (1.0, 1.0, 0.3)), ((2, 3, 1), (0.5, 0.6, 0.3)))
@@ -91,7 +91,7 @@ ENTRIES = (
         measure=incline,
         **control("coefficient of friction 0.11 % higher", friction=1.0011 * FRICTION),
         within=1.5e-4,
-        because="two tangents are 0.01 % below and 0.02 % above the coefficient: the block must stick at one, slip at the other",
+        because="two tangents are 0.01 % below and 0.02 % above the coefficient: the block must stick at one and slip at the other",
         source="Coulomb: the tangent of the angle is the coefficient of friction",
     ),
     DRAG(

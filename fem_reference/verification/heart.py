@@ -1,4 +1,4 @@
-"""The cardiac mechanics benchmark (Land et al. 2015): a bending beam, an inflated ventricle and a contracting one."""
+"""The cardiac mechanics benchmark (Land et al. 2015): a bending beam, an inflated ventricle and a contracting ventricle."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -18,20 +18,20 @@ land = find("land")
 BULK = 100.0  # [MPa], about 1e4 times the stresses: J is 1 within 1e-4 on average
 RESIDUAL = 1e-10  # [N, mm3]; the beam carries 2e-5 N
 X = (1.0, 0.0, 0.0)
-APEX = 0.6  # length of the cells at the apex of the contracting ventricle, relative to that in the uniform mesh
+APEX = 0.6  # length of the cells at the apex of the contracting ventricle, relative to the uniform mesh
 AROUND = 7.85  # an eighth of the outer circumference of the ventricle at its widest [mm]; cell sizes are this length divided by n
 ENDO, EPI = (0.0, 0.0, -17.0), (0.0, 0.0, -20.0)
 Point = tuple[float, float, float]
 
 
 def helix(cells: Ints, points: Floats) -> Floats:  # noqa: ARG001
-    """The fibres of problem 3, from +90 degrees inside to -90 degrees outside: unit vectors (n, 3) at rest points (n, 3) [mm]."""
+    """The fibre directions of problem 3, from +90 degrees inside to -90 degrees outside: (n, 3) at rest ``points`` (n, 3) [mm]."""
     return np.asarray(land.fibre(points))
 
 
 @dataclass(frozen=True)
 class Heart:
-    """A problem solved with an ``element`` on cells of ``degree`` (1 straight, 2 curved); its stiffness and active tension are
+    """A problem solved with an ``element`` on cells of ``degree`` (1 straight, 2 curved). The stiffness and the active tension are
     multiplied by ``stiff`` and ``active`` (1: the true values).
     """
 
@@ -41,7 +41,7 @@ class Heart:
     active: float = 1.0
 
     def effects(self, number: int, on: str) -> tuple[Effect, ...]:
-        """The effects of problem ``number`` of ``validation.land``, with these factors, and with its pressure ``on`` a surface."""
+        """The effects of problem ``number`` of ``validation.land``, scaled by these factors, with its pressure ``on`` a surface."""
         problem = getattr(land, f"PROBLEM_{number}")
         law, tension = problem.law, problem.tension * self.active
         acting = (
@@ -52,19 +52,19 @@ class Heart:
         return (*acting, make("active_tension", tension=f"{tension} MPa", ramp=ramp())) if tension else acting
 
     def beam(self, n: int) -> Body:
-        """Half of the beam of problem 1, y <= 0.5, in 10n by n by 2n cells."""
+        """Half of the beam of problem 1, the half y <= 0.5, in 10n by n by 2n cells."""
         mesh = shapes.box((10 * n, n, 2 * n), (10.0, 0.5, 1.0), ELEMENTS[self.element][0], self.degree)
         fixed = (*clamped("x0"), *sliding("y1"))
         return Body(mesh, self.effects(1, "z0"), fixed, (0.0, 1.0), Along(X))
 
     def passive(self, n: int) -> Body:
-        """A quarter of the ventricle of problem 2, whose material is isotropic, with n cells around an eighth of a turn."""
+        """A quarter of the isotropic ventricle of problem 2; n cells span an eighth of the circumference."""
         mesh = shapes.ventricle_quarter((n, 7 * n // 2, n), ELEMENTS[self.element][0], self.degree)
         fixed = (*clamped("base"), *sliding("x0", "y0"))
         return Body(mesh, self.effects(2, "endo"), fixed, (0.0, 1.0), Along(X))
 
     def contracting(self, n: int) -> Body:
-        """The ventricle of problem 3, whose pressure and tension grow together, with n cells around an eighth of a turn."""
+        """The ventricle of problem 3, whose pressure and tension grow together; n cells span an eighth of its circumference."""
         mesh = _crowded(shapes.ventricle((n, 7 * n // 2, n), ELEMENTS[self.element][0], self.degree))
         return Body(mesh, self.effects(3, "endo"), clamped("base"), (0.0, 1.0), helix)
 
@@ -78,8 +78,8 @@ def height(lab: Lab, n: int, body: str, point: Point, **heart: Any) -> float:
 
 
 def _crowded(mesh: Cells) -> Cells:
-    """The ventricle ``mesh`` with cells a = ``APEX`` times as long at the apex: the angle w from the apex, 1 at the base, becomes
-    ``w (a + (1 - a) w^2)``. Fibres meet at the apex, and the stress has a logarithmic singularity along the axis.
+    """The ventricle ``mesh`` with cells at the apex that are a = ``APEX`` times as long: the angle w from the apex, scaled to 1 at
+    the base, becomes ``w (a + (1 - a) w^2)``. Fibres meet at the apex, and the stress has a logarithmic singularity along the axis.
     """
     points = mesh.points
     depth = land.depth(points)

@@ -1,6 +1,6 @@
-"""Blocks in homogeneous states: every element represents linear functions exactly, so that only rounding remains.
+"""Blocks in homogeneous states. Every element represents linear functions exactly, so only rounding remains.
 
-The entries of ``fibres`` and ``loads`` use ``Specimen`` too. The bulk modulus is finite in the body and in the closed form alike.
+The entries of ``fibres`` and ``loads`` use ``Specimen`` too. The bulk modulus is finite in the body as well as in the closed form.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,7 @@ STEPS = {"first_step": 0.25, "residual": 1e-13}
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """The ``effects`` of a body without its resistance to volume change, and the same ``law`` from ``validation/``."""
+    """The ``effects`` of a body without its resistance to volume change, and the same material as a ``law`` of ``validation/``."""
 
     effects: tuple[Effect, ...]
     law: object
@@ -74,8 +74,8 @@ MODES: dict[str, tuple[Callable[[float], tuple[Prescribed, ...]], str]] = {
 
 @dataclass(frozen=True, eq=False)
 class Specimen:
-    """A block of ``SIZE`` in a homogeneous state: a mode of ``MODES`` and its ``amount``, a stretch, a shear or, for the mode
-    "pulled", the nominal stress [MPa] that the ``loads`` apply.
+    """A block of ``SIZE`` in a homogeneous state, given by a mode of ``MODES`` and its ``amount``: a stretch, a shear or, for the
+    mode "pulled", the nominal stress [MPa] that the ``loads`` apply.
     """
 
     material: Material
@@ -101,7 +101,7 @@ class Specimen:
         return mode(self.material.law, self.bulk, self.amount, np.array(self.fibre))
 
     def known_force(self) -> float:
-        """The nominal stress times the area [N]."""
+        """The force [N]: the nominal stress times the area."""
         axis = "xyz".index(MODES[self.mode][1][0])
         return float(self._known().P[0, axis] * np.prod(np.delete(SIZE, axis)))
 
@@ -111,7 +111,7 @@ class Specimen:
 
 
 def force(lab: Lab, specimen: Specimen) -> float:
-    """The force along x on the pulled face [N]; in simple shear the forces at its edges with x0 and x1 cancel."""
+    """The force [N] along x on the pulled face. In simple shear the forces at the edges shared with x0 and x1 cancel."""
     return float(specimen.last(lab).forces[MODES[specimen.mode][1]][0])
 
 
@@ -131,7 +131,9 @@ BLOCK = partial(
 
 
 def force_entry(group: str, name: str, title: str, specimen: Specimen, negative_control: str, **wrong: Any) -> Entry:
-    """The force on a ``specimen`` against its closed form; the negative control replaces its fields by those in ``wrong``."""
+    """The entry that compares the force on a ``specimen`` with its closed form. In the negative control, the fields in ``wrong``
+    replace those of the specimen.
+    """
     return BLOCK(
         name=name,
         group=group,
@@ -147,7 +149,7 @@ def force_entry(group: str, name: str, title: str, specimen: Specimen, negative_
 def stretch_entry(
     axis: int, group: str, name: str, title: str, specimen: Specimen, negative_control: str, **wrong: Any
 ) -> Entry:
-    """The stretch of a ``specimen`` along an axis against its closed form."""
+    """The entry that compares the stretch of a ``specimen`` along an ``axis`` with its closed form."""
     other = force_entry(group, name, title, specimen, negative_control, **wrong)
     truth = partial(specimen.known_stretch, axis)
     return replace(other, unit="1", measure=stretch, given={**other.given, "axis": axis}, truth=truth)

@@ -1,4 +1,4 @@
-"""Inertia: free fall, a vibrating bar, a block in large swings, and the limit of slow motion."""
+"""Inertia: a free fall, a vibrating bar, a block that swings with a large amplitude, and the limit of slow motion."""
 
 from functools import partial
 
@@ -19,7 +19,7 @@ MODULUS = inertia.uniaxial_modulus(MU, BULK)
 OMEGA = inertia.first_frequency(MODULUS, DENSITY, LENGTH)
 PERIOD = 2 * np.pi / OMEGA
 G, FALLING = 9810.0, 0.1  # [mm/s^2], [s]
-SWINGING, STEPS = 0.17, 600  # duration of ten swings [s], and their number of time steps
+SWINGING, STEPS = 0.17, 600  # duration of ten swings [s], and the number of time steps in it
 STEP = {"first_step": 1.0, "largest_step": 1.0}
 
 
@@ -29,13 +29,13 @@ def mass(factor: float = 1.0, spectral_radius: float = 0.9) -> Effect:
 
 
 def weight(axis: int, acceleration: float) -> Effect:
-    """Gravity along an axis [mm/s^2], applied at once."""
+    """Gravity with an ``acceleration`` [mm/s^2] along an axis, applied suddenly."""
     at_once = [{"frame": 0.0, "amount": 1.0}]
     return make("gravity", density=DENSITY, acceleration=(acceleration * np.eye(3)[axis]).tolist(), ramp=at_once)
 
 
 def fallen(lab: Lab, factor: float) -> float:
-    """The fall [mm] of a free block, whose tangent matrix is regular only because of its mass."""
+    """The distance [mm] that a free block falls. Its tangent matrix is regular only because the block has mass."""
     mesh = shapes.box((1, 1, 1), (10.0, 10.0, 10.0), "tetrahedron")
     acting = (*neo_hooke(MU, 1e3 * MU), mass(factor), weight(2, -G))
     solved = lab.solve(Body(mesh, acting, (), frames(10, 10), interval=FALLING / 10), "P2/P1", **STEP)
@@ -43,15 +43,16 @@ def fallen(lab: Lab, factor: float) -> float:
 
 
 def bar(acting: tuple[Effect, ...], prescribed: tuple[Prescribed, ...], count: int, seconds: float) -> Body:
-    """A bar that cannot widen, one end of which is fixed along its axis, over ``count`` frames that last ``seconds`` in total."""
+    """A bar of constant cross-section with one end fixed along its axis. The ``count`` frames last ``seconds`` in total."""
     mesh = shapes.box((8, 1, 1), (LENGTH, 1.0, 1.0), "tetrahedron")
     fixed = (*sliding("x0", "y0", "y1", "z0", "z1"), *prescribed)
     return Body(mesh, (*neo_hooke(MU, BULK, "P2"), *acting), fixed, frames(count, count), interval=seconds / count)
 
 
 def frequency(lab: Lab, steps: int, factor: float) -> float:
-    """The frequency of the first mode of a bar [rad/s] under a small axial weight, over two periods of ``steps`` time steps each:
-    a cosine about a mean obeys ``q(n + 1) + q(n - 1) = 2 c q(n) + constant``, with c the cosine of the phase of one step.
+    """The frequency [rad/s] of the first mode of a bar under a small axial weight, from two periods of ``steps`` time steps each.
+
+    A cosine about a mean obeys ``q(n + 1) + q(n - 1) = 2 c q(n) + constant``, where c is the cosine of the phase of one step.
     """
     acting = mass(factor), weight(0, 1e-4 * MODULUS / DENSITY / LENGTH)
     solved = lab.solve(bar(acting, (), 2 * steps, 2 * PERIOD), "P2", **STEP, residual=1e-14)
@@ -65,8 +66,8 @@ def frequency(lab: Lab, steps: int, factor: float) -> float:
 
 
 def departure(lab: Lab, spectral_radius: float) -> Finding:
-    """The maximum change of the total (elastic, kinetic and potential) energy, divided by the maximum kinetic energy, of a block
-    clamped at one side that swings under its own weight, which is applied at once.
+    """The maximum change of the total energy (elastic, kinetic and potential) of a block, divided by the maximum kinetic energy.
+    The block is clamped at one side and swings under its own weight, which is applied suddenly.
     """
     mesh = shapes.box((4, 1, 1), (4.0, 1.0, 1.0), "tetrahedron")
     acting = (*neo_hooke(MU, 100 * MU), mass(1.0, spectral_radius), weight(2, -6e4))
@@ -81,14 +82,16 @@ def departure(lab: Lab, spectral_radius: float) -> Finding:
     return Finding(float(np.abs(total).max() / kinetic.max()), note=note)
 
 
-# A smooth pull along x: ``10 s^3 - 15 s^4 + 6 s^5`` of a distance [mm], where s is the fraction of the frames that have passed.
+# A smooth pull along x: after the fraction s of the frames, ``10 s^3 - 15 s^4 + 6 s^5`` of the distance WAY [mm] is covered.
 FRAMES, WAY = 64, 1e-4 * LENGTH
 SMOOTH = Polynomial((0, 0, 0, 10, -15, 6))
 PULL = Affine(NO_GRADIENT, (WAY, 0.0, 0.0), tuple((float(i), float(SMOOTH(i / FRAMES))) for i in range(FRAMES + 1)))
 
 
 def more(lab: Lab, periods: float, factor: float) -> float:
-    """The force [N] due to inertia after a quarter of a pull by 1e-4 of the length, which takes ``periods`` of the first mode."""
+    """The force [N] due to inertia after the first quarter of a pull, which lasts ``periods`` periods of the first mode and
+    stretches the bar by 1e-4 of its length.
+    """
     pulled, count = (Prescribed("x1", "x1", (0,), PULL),), FRAMES // 4
     bodies = bar((), pulled, count, PERIOD / 4), bar((mass(factor),), pulled, count, periods * PERIOD / 4)
     without, moving = (lab.solve(body, "P2", **STEP, residual=1e-14).last.forces["x1"][0] for body in bodies)
@@ -96,7 +99,9 @@ def more(lab: Lab, periods: float, factor: float) -> float:
 
 
 def slow(lab: Lab, factor: float) -> Finding:
-    """The inertia force divided by its limit for slow motion, in three pulls, each twice as long; its error is of order speed^2."""
+    """The inertia force in the slowest of three pulls, divided by its limit for slow motion. Each pull lasts twice as long as the
+    one before it; the error decreases with the square of the speed.
+    """
     ladder = tuple((1 / periods, more(lab, periods, factor)) for periods in (4.0, 8.0, 16.0))
     acceleration = WAY * float(SMOOTH.deriv(2)(0.25)) / (16.0 * PERIOD) ** 2
     known = inertia.pull_of_inertia(DENSITY, LENGTH, 1.0, acceleration)
@@ -116,7 +121,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: inertia.fall(G, FALLING),
         within=1e-9,
         relative=True,
-        because="Time steps are exact for a constant acceleration; the residual is 1e-8 N in each step, at forces of 1e-2 N.",
+        because="The time steps are exact for a constant acceleration; each leaves a residual of 1e-8 N, at forces of 1e-2 N.",
         source="validation/inertia.py, fall",
     ),
     MOVING(
@@ -140,7 +145,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="",
         measure=departure,
         given={"spectral_radius": 0.9},
-        **control("A time integration that removes the shortest waves.", spectral_radius=0.0),
+        **control("A time integration that damps out the highest frequencies.", spectral_radius=0.0),
         truth=0.0,
         within=0.01,
         because="Nothing dissipates energy; a drift of 1 % in ten periods of 60 time steps is allowed.",
@@ -149,7 +154,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     MOVING(
         name="slow_pull",
-        title="Bar that is pulled more and more slowly: the inertia force, divided by its limit for slow motion",
+        title="Bar in three pulls, each slower than the one before: the inertia force, divided by its limit for slow motion",
         unit="",
         measure=slow,
         given={"factor": 1.0},
@@ -157,8 +162,8 @@ ENTRIES: tuple[Entry, ...] = (
         truth=1.0,
         within=0.02,
         relative=True,
-        because="The next term of the expansion is of the order of (period / duration of the pull)^2: below 1 %; time steps of a "
-        "sixty-fourth of the pull also add up to 1 %.",
+        because="The next term of the expansion is of the order of (period / duration of the pull)^2, which is below 1 %; time "
+        "steps of a sixty-fourth of the pull contribute up to 1 % more.",
         source="validation/inertia.py, pull_of_inertia",
     ),
 )

@@ -1,4 +1,4 @@
-"""Inflation of hollow bodies: a sphere, past its limit point (the largest pressure), and a tube.
+"""Inflation of hollow bodies: a sphere inflated past its limit point (the maximum pressure), and a tube.
 
 If the motion of the inner face is prescribed, the pressure is the derivative of the energy with respect to the enclosed volume,
 as the energy grows by the work of the pressure. A polynomial interpolates the energy at a few stretches of the inner face.
@@ -27,13 +27,14 @@ NEARLY = 1e6  # [MPa], the bulk modulus if the closed form is for incompressible
 INNER, OUTER, LENGTH = 10.0, 20.0, 5.0  # radii of sphere and tube, length of the tube [mm]
 STRETCH, BEYOND = 1.5, 2.2  # a / A of the inner face; the pressure of the sphere is largest at 1.83
 PRESSED = 0.7  # [MPa]; the limit pressure of the sphere is 0.82
-# A soft sphere [MPa] with a membrane [mm] on its inner face, which carries most of a pressure [MPa].
+# Shear modulus of a soft sphere [MPa], thickness of a membrane on its inner face [mm], and a pressure [MPa] that the membrane
+# mostly carries.
 SOFT, THICKNESS, SHEATHED = 0.01, 0.5, 0.05
 RESIDUAL = 1e-8  # [N, mm3], at forces of about 100 N
 
 Material = tuple[Effect, ...]
 Pressures = Callable[[float], float]  # the pressure [MPa] at a stretch a / A of the inner face
-# The largest stretch, and the function that reads a value from the pressures up to this stretch.
+# The largest stretch, and the function that reads a value from the pressures at stretches up to it.
 Reading = tuple[float, Callable[[Pressures], float]]
 
 
@@ -51,8 +52,8 @@ def slope(solved: Run) -> Chebyshev:
 
 
 def blown(lab: Lab, n: int, reading: Reading, element: str, material: Material, degree: int = 2) -> float:
-    """A ``reading`` of an octant of the sphere in 3 n^2 by 2 n cells, which are straight if ``degree`` is 1. The inner face, of
-    radius a, is displaced outwards and encloses ``pi a^3 / 6``.
+    """A ``reading`` of an octant of the sphere in 3 n^2 by 2 n cells, which are straight if ``degree`` is 1. The inner face, with
+    the radius a, is displaced outwards and encloses the volume ``pi a^3 / 6``.
     """
     largest, read = reading
     grown = Prescribed("inner", "inner", (0, 1, 2), radially(1.0, knots=((1.0, 0.0), (2.0, 1.0), (3.0, 2.0))))
@@ -64,7 +65,7 @@ def blown(lab: Lab, n: int, reading: Reading, element: str, material: Material, 
 
 
 def top(pressures: Pressures) -> float:
-    """The stretch between STRETCH and BEYOND at which the ``pressures`` are largest."""
+    """The stretch between STRETCH and BEYOND at which the ``pressures`` have their maximum."""
     found = minimize_scalar(lambda stretch: -pressures(stretch), bounds=(STRETCH, BEYOND), options={"xatol": 1e-7})
     return float(found.x)
 
@@ -89,12 +90,12 @@ def tube(lab: Lab, n: int, element: str, ends: tuple[str, ...] = ("bottom", "top
 
 
 def tube_pressure(lab: Lab, n: int, **given: Any) -> float:
-    """The pressure in the tube at STRETCH [MPa]: the quarter encloses ``pi a^2 L / 4``."""
+    """The pressure [MPa] in the tube at STRETCH. The quarter of the tube encloses the volume ``pi a^2 L / 4``."""
     return float(slope(tube(lab, n, **given))(STRETCH) / (np.pi / 2 * INNER**2 * STRETCH * LENGTH))
 
 
 def tube_force(lab: Lab, n: int, **given: Any) -> float:
-    """The force [N] on an end of the tube, all four quarters, at STRETCH."""
+    """The force [N] at STRETCH on one end of the tube, summed over all four quarters."""
     return float(4 * tube(lab, n, **given).last.forces["top"][2])
 
 
@@ -124,7 +125,7 @@ TRUE_LAW, TRUE_SPHERE = laws.neo_hooke(MU), find("rivlin").Sphere(MU, INNER, OUT
 
 
 def true_pressure(law: object, stretch: float = STRETCH) -> float:
-    """The pressure in the sphere [MPa] with a law of ``validation/laws.py``."""
+    """The pressure [MPa] in the sphere for a law of ``validation/laws.py``."""
     return float(radial.sphere_pressure(law, BULK, (INNER, OUTER), stretch))
 
 
@@ -140,7 +141,7 @@ OTHER_LAW = "Mooney-Rivlin material with the same shear modulus, whose pressure 
 RISING = control(OTHER_LAW, material=MOONEY_RIVLIN)
 INFLATED = partial(Entry, group="inflation", relative=True, kind="closed form")
 FINITE = partial(INFLATED, source="Ogden 1984, ch. 5.3, with a finite bulk modulus; validation/radial.py")
-# Pressure at STRETCH [MPa], the largest pressure [MPa] and its stretch, and the fall from there to BEYOND [MPa].
+# The pressure at STRETCH [MPa], the maximum pressure [MPa] and its stretch, and the drop in pressure from there to BEYOND [MPa].
 AT_STRETCH: Reading = (1.6, lambda pressures: pressures(STRETCH))
 LARGEST: Reading = (BEYOND, lambda pressures: pressures(top(pressures)))
 WHERE_LARGEST: Reading = (BEYOND, top)

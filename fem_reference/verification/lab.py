@@ -20,7 +20,7 @@ class FemLab:
         self.session = session
 
     def solve(self, body: Body, element: str, **settings: Any) -> Run:
-        """The states of ``body``, computed by the reference, FEniCSx; RuntimeError if it crashed or exceeded the time limit."""
+        """The states of ``body``, computed by FEniCSx. Raises RuntimeError if FEniCSx crashed or exceeded the time limit."""
         limited = {"time_limit": _TIME_LIMIT} | settings
         solved = self.session.solve(body, fenicsx.BodySettings(element=element, **limited))
         if solved.outcome.status in ("crashed", "timed out", "stalled"):
@@ -28,12 +28,12 @@ class FemLab:
         return second_check.confirmed_body(body, solved)
 
     def second(self, body: Body, element: str, **settings: Any) -> Run:
-        """The states of ``body``, computed by the second opinion, scikit-fem."""
+        """The states of ``body``, computed by scikit-fem."""
         return scikit_fem.solve_body(body, scikit_fem.ScikitBodySettings(element=element, **settings))
 
 
 @contextmanager
 def lab() -> Iterator[FemLab]:
-    """A context with a lab, whose process ends with the context. MissingSoftware if FEniCSx is not installed."""
+    """A context with a lab, whose process ends with the context. Raises MissingSoftware if FEniCSx is not installed."""
     with fenicsx.session() as session:
         yield FemLab(session)

@@ -26,7 +26,7 @@ QUARTER = Turn((0.0, 1.0, 0.0), np.pi / 2, knots=((1.0, 0.0), (2.0, 1.0)))
 
 
 def weight(density: float, times: float = 1.0) -> Effect:
-    """Gravity along -z, ``times`` the earth's gravity, on a material of ``density`` [tonne/mm3]."""
+    """Gravity along -z on a material of ``density`` [tonne/mm3], with ``times`` the gravity of the earth."""
     pull = f"0, 0, {-FREE_FALL * times} mm/s^2"
     return make("gravity", density=f"{density} tonne/mm^3", acceleration=pull, ramp=parts.ramp())
 
@@ -37,7 +37,7 @@ def pressed(pressure: float) -> Effect:
 
 
 def dead(nominal: float) -> Effect:
-    """A force per unit rest area along x on the face x1 [MPa]."""
+    """A force per unit rest area [MPa] along x on the face x1."""
     return make("traction", on="x1", force=f"{nominal}, 0, 0 MPa", ramp=parts.ramp())
 
 
@@ -49,7 +49,7 @@ def loaded(
     frames: int = 1,
     bulk: float = BULK,
 ) -> Run:
-    """The states of a block, with some of its faces ``wet``, under a ``load``, over a number of ``frames``."""
+    """The states of a block, some of whose faces are ``wet``, under a ``load`` over a number of ``frames``."""
     mesh = shapes.box((2, 2, 2), SIZE, "tetrahedron")
     mesh = replace(mesh, facets=mesh.facets | {"wet": np.concatenate([mesh.facets[face] for face in wet])})
     body = Body(mesh, (*parts.neo_hooke(MU, bulk), load), prescribed, tuple(range(frames + 1)))
@@ -64,7 +64,7 @@ def reaction(lab: Lab, density: float) -> float:
 
 
 def top(lab: Lab, cells: int, element: str) -> float:
-    """The displacement of the top of the column [mm], with a number of cells along its height."""
+    """The displacement [mm] of the top of the column, with a number of ``cells`` along its height."""
     mesh = shapes.box((1, 1, cells), (2.0, 2.0, HEIGHT), ELEMENTS[element][0])
     acting = (*parts.neo_hooke(MU, SOFT, element), weight(MUSCLE, WEIGHT / (MUSCLE * FREE_FALL)))
     body = Body(mesh, acting, parts.sliding("x0", "x1", "y0", "y1", "z0"), (0, 1))
@@ -72,20 +72,20 @@ def top(lab: Lab, cells: int, element: str) -> float:
 
 
 def shrunk(lab: Lab, pressure: float) -> float:
-    """V/V0 of a block in a fluid of ``pressure`` [MPa]; it slides on its planes of symmetry."""
+    """V/V0 of a block in a fluid of ``pressure`` [MPa]. The block slides on its planes of symmetry."""
     solved = loaded(lab, ("x1", "y1", "z1"), pressed(pressure), parts.SYMMETRY, bulk=COMPRESSIBLE)
     return solved.last.scalars["volume_ratio"]
 
 
 def left_over(lab: Lab, faces: tuple[str, ...]) -> float:
-    """The sum of the forces [N] on both ends of a block, whose top is tilted by 0.3 rad, in a fluid that wets ``faces``."""
+    """The magnitude [N] of the total force on both ends of a block in a fluid that wets ``faces``; its top is tilted by 0.3 rad."""
     ends = (*parts.clamped("z0"), Prescribed("z1", "z1", (0, 1, 2), TILT))
     forces = loaded(lab, faces, pressed(2 * MU), ends).last.forces
     return float(np.linalg.norm(forces["z0"] + forces["z1"]))
 
 
 def turned(lab: Lab, load: Effect) -> float:
-    """The largest error [mm] of a node when the base of a block that leans under a ``load`` is turned by 90 degrees."""
+    """The largest error [mm] of a nodal position after the base of a block leaning under a ``load`` is rotated by 90 degrees."""
     solved = loaded(lab, ("x1",), load, (Prescribed("z0", "z0", (0, 1, 2), QUARTER),), frames=2)
     before = solved.states[1].points
     return parts.farthest(solved.last.points, before + QUARTER(before, 2))
@@ -173,7 +173,7 @@ ENTRIES: tuple[Entry, ...] = (
         "dead_pull",
         "Block pulled by a dead load: its stretch",
         PULLED,
-        "The force acts per current instead of rest area.",
+        "The load is a force per current instead of rest area.",
         loads=(make("pressure", on="x1", pressure=f"{-MU} MPa", ramp=parts.ramp()),),
     ),
 )

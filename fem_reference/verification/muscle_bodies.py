@@ -1,7 +1,7 @@
-"""Idealised muscles compared with measured ones: a vastus lateralis with its aponeurosis, and a sphere on a tibialis anterior.
+"""Idealised muscles compared with measurements: a vastus lateralis with its aponeurosis, and a tibialis anterior under a sphere.
 
-The material is the shipped one, chosen from other sources and never fitted to these measurements. Shapes are idealised, and
-their sizes are recalled or assumed, so no entry validates the model. The measurements of the publications are in
+The material is the shipped one, which was chosen from other sources and never fitted to these measurements. The shapes are
+idealised and their sizes are recalled or assumed, so no entry validates the model. The published measurements are in
 ``validation/experiments``.
 """
 
@@ -45,7 +45,7 @@ _MU, _ALPHA = find("bosboom_2001", "ogden_mu", ""), find("bosboom_2001", "ogden_
 
 @dataclass(frozen=True)
 class Above:
-    """The height above the muscle's upper face [mm]; the aponeurosis lies above this face."""
+    """The height [mm] above the upper face of the muscle. The aponeurosis lies above this face."""
 
     def __call__(self, points: Floats) -> Floats:
         """The heights (n,) of points (n, 3) [mm]."""
@@ -53,8 +53,8 @@ class Above:
 
 
 def vastus(n: int, arm: float) -> Body:
-    """Half a planar muscle whose fibres rise from the bone to an aponeurosis. The end of the aponeurosis is displaced by the moment
-    arm ``arm`` [mm] times the knee flexion. The aponeurosis slides below a fascia, which keeps the thickness constant.
+    """Half of a planar muscle whose fibres rise from the bone to an aponeurosis. The end of the aponeurosis is displaced by the
+    moment arm ``arm`` [mm] times the knee flexion. The aponeurosis slides below a fascia, which keeps the thickness constant.
     """
     counts, size = (6 * n, 2 * n, 2 * n), (APONEUROSIS, THICK, HALF_WIDTH)
     rising = Brick(lambda u: u * size + u[:, 1:2] * (ALONG, 0, 0), counts, {"y0": "bone", "z0": "middle"})
@@ -87,9 +87,10 @@ def vastus_stretch(lab: Lab, n: int, arm: float) -> float:
 
 
 class FittedOgden(Energy):
-    """``2 mu/a^2 (l1^a + l2^a + l3^a - 3)`` of the isochoric principal stretches (Ogden 1972),
-    with the even exponent a = 22 nearest to the 21.4 that Bosboom et al. 2001 fitted: a sum of even powers is a polynomial of
-    invariants (Newton's identities), smooth at rest. ``mu``: shear modulus at rest [MPa].
+    """The law ``2 mu/a^2 (l1^a + l2^a + l3^a - 3)`` of the isochoric principal stretches (Ogden 1972), with the exponent a = 22.
+
+    This is the even exponent nearest to the 21.4 that Bosboom et al. 2001 fitted. A sum of even powers is a polynomial in the
+    invariants (Newton's identities), which is smooth at rest. ``mu``: shear modulus at rest [MPa].
     """
 
     half: ClassVar[int] = 11
@@ -109,7 +110,7 @@ class FittedOgden(Energy):
 
 
 def ball_force(lab: Lab, n: int, depth: float, laws: tuple[Effect, ...]) -> float:
-    """The force [N] of a smooth sphere that is pressed to a ``depth`` [mm] into a muscle on bone, across its fibres."""
+    """The force [N] of a smooth sphere that is pressed to a ``depth`` [mm] into a muscle on a bone, across the fibres."""
 
     def place(u: Floats) -> Floats:
         finer = np.column_stack([u[:, 0] ** 1.4, u[:, 1] ** 1.4, 1 - (1 - u[:, 2]) ** 1.2])
@@ -132,13 +133,13 @@ def ball_force(lab: Lab, n: int, depth: float, laws: tuple[Effect, ...]) -> floa
 
 
 def indentation(lab: Lab, n: int, depth: float, mu: float) -> float:
-    """The force on the shipped material, with the shear modulus ``mu`` [MPa], divided by that on the fitted law."""
+    """The force on the shipped material with the shear modulus ``mu`` [MPa], divided by the force on the fitted law."""
     shipped = make("neo_hooke", mu=f"{mu} MPa"), make("fibre_passive", **FIBRES)
     fitted = (FittedOgden.model_validate({"mu": f"{_MU.value} kPa"}),)
     return ball_force(lab, n, depth, shipped) / ball_force(lab, n, depth, fitted)
 
 
-# For each depth [mm]: half the difference of forces at the exponents 16 and 28 (the reported deviation is 5.7), over that at 22.
+# For each depth [mm]: half the difference of the forces at exponents 16 and 28 (reported deviation: 5.7), divided by that at 22.
 _BY_EXPONENT = {0.6: 0.071, 1.2: 0.271}
 _SARCOMERES = find("chen_2016", "sarcomere_length", "110 deg"), find("chen_2016", "sarcomere_length", "50 deg")
 _STRETCH, _SD = ratio(*_SARCOMERES)
@@ -150,7 +151,7 @@ _OTHER_MU = (
 
 
 def _indented(name: str, share: str, depth: float, pinned: float) -> Entry:
-    """The entry of an indentation to a ``depth`` [mm]; ``share``: this fraction of the thickness, in words."""
+    """The entry for an indentation to a ``depth`` [mm]; ``share``: this depth as a fraction of the thickness, in words."""
     spread = (_MU.sd or math.nan) / _MU.value
     return EXPERIMENT(
         name=name,

@@ -45,7 +45,7 @@ def find(name: str) -> ModuleType:
 
 
 def control(words: str, **wrong: object) -> dict[str, Any]:
-    """The negative control of an entry: a deliberate mistake in words, and the wrong values that make it."""
+    """The negative control of an entry: a deliberate mistake, described in ``words``, and the ``wrong`` values that cause it."""
     return {"negative_control": words, "wrong": wrong}
 
 
@@ -95,5 +95,5 @@ def farthest(points: Floats, others: Floats) -> float:
 
 
 def nearest(points: Floats, place: Iterable[float]) -> int:
-    """The index of the point in ``points`` (n, 3) that is nearest to a ``place`` (3,)."""
+    """The index of the point in ``points`` (n, 3) that is nearest to the position ``place`` (3,)."""
     return int(np.argmin(np.linalg.norm(points - np.array(tuple(place)), axis=1)))

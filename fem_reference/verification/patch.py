@@ -13,12 +13,12 @@ from fem_reference.verification.fibres import active
 from fem_reference.verification.homogeneous import BULK, NEO, SIZE, STEPS, Material, X, everywhere
 from fem_reference.verification.parts import SURFACE, control, farthest, resistance
 
-# The displacement gradient of a stretch, a shear and a rotation at once, which changes the volume to 1.2 times the rest volume.
+# The displacement gradient of a combined stretch, shear and rotation, which changes the volume to 1.2 times the rest volume.
 GRADIENT: Matrix = ((0.2, 0.35, -0.1), (-0.15, 0.05, 0.3), (0.1, -0.2, -0.15))
 COUNTS, BUMP = (2, 2, 3), 0.1
 AXIS, ANGLE, CENTRE = (1.0, 2.0, 3.0), 1.0, (1.0, -2.0, 0.5)  # rad, mm
 ENDS = ("z0", "z1")
-AT_ONCE = {"first_step": 1.0, "smallest_step": 0.9, "residual": 1e-13}  # a failed step is not cut into smaller ones
+AT_ONCE = {"first_step": 1.0, "smallest_step": 0.9, "residual": 1e-13}  # a failed step is not divided into smaller ones
 
 
 def patch(element: str, degree: int, share: float = 1.0) -> Body:
@@ -36,13 +36,16 @@ def patch_error(lab: Lab, element: str, degree: int, share: float = 1.0) -> floa
 
 
 def turn(share: float) -> Turn:
-    """The turn from frame 1 to 2, by ``share`` times 1 rad about an oblique axis."""
+    """The rotation from frame 1 to frame 2, by ``share`` times 1 rad about an oblique axis."""
     return Turn(AXIS, share * ANGLE, CENTRE, knots=((1.0, 0.0), (2.0, 1.0)))
 
 
 def states(lab: Lab, material: Material, element: str, faces: tuple[str, ...], further: float) -> tuple[Frame, Frame]:
-    """A warped box before and after a turn of its ``faces``; z1, or every face if all turn, turns ``further`` times the angle. All
-    faces turn in one step, two ends in several. Before the turn, at frame 1, the box is at rest, or contracted by its fibres.
+    """The states of a warped box before and after a rotation of its ``faces``.
+
+    If all faces rotate, they do so in one step, by ``further`` times the angle. If only the two ends rotate, they do so in several
+    steps, and only z1 rotates by ``further`` times the angle. Before the rotation, at frame 1, the box is at rest or contracted by
+    its fibres.
     """
     mesh = shapes.warped_box(COUNTS, SIZE, ELEMENTS[element][0], 1, BUMP)
     moved = SURFACE if faces == SURFACE else ("z1",)
@@ -53,13 +56,13 @@ def states(lab: Lab, material: Material, element: str, faces: tuple[str, ...], f
 
 
 def turned_error(lab: Lab, material: Material, element: str, faces: tuple[str, ...], further: float = 1.0) -> float:
-    """The largest distance [mm] of a node from its exact position after the turn."""
+    """The largest distance [mm] of a node from its exact position after the rotation."""
     before, after = states(lab, material, element, faces, further)
     return farthest(after.points, before.points + turn(1.0)(before.points, 2))
 
 
 def turned_energy(lab: Lab, material: Material, element: str, faces: tuple[str, ...], further: float = 1.0) -> float:
-    """The energy that the turn stores [N mm]."""
+    """The energy [N mm] that the rotation stores."""
     before, after = states(lab, material, element, faces, further)
     return after.scalars["energy"] - before.scalars["energy"]
 
@@ -109,8 +112,8 @@ ENTRIES = (
         given={"material": NEO, "element": "P2/P1", "faces": ENDS},
         negative_control="One end is turned 1 % further.",
         within=1e-14,
-        because="A rotation stores no energy; the rounding of mu/2 (I1 - 3) remains: mu/2 I1 of the whole block is 0.14 N mm, its "
-        "last digit 3e-17, and I1 and the sum over the block take some hundred operations.",
+        because="A rotation stores no energy; only the rounding of mu/2 (I1 - 3) remains: mu/2 I1 of the entire block is 0.14 N "
+        "mm, its last digit is 3e-17, and I1 and the sum over the block take some hundred operations.",
     ),
     replace(
         BLOCK,

@@ -22,17 +22,17 @@ STIFF, WIDTH = 4.0, 2.0  # length of the stiff part and width of the transition 
 
 @dataclass(frozen=True)
 class Below:
-    """The depth below the plane at ``x`` [mm], positive on the side of smaller x."""
+    """The depth [mm] below the plane at ``x`` [mm], positive on the side of smaller x."""
 
     x: float
 
     def __call__(self, points: Floats) -> Floats:
-        """The depths (n,) [mm]."""
+        """The depths (n,) [mm] of ``points`` (n, 3) [mm]."""
         return np.asarray(self.x - points[:, 0])
 
 
 def bar(element: str, cells: int, width: float, stiff: float = STIFF) -> Body:
-    """The bar with ``cells`` along its length, of which the first ``stiff`` mm are a thousand times as stiff as the others."""
+    """The bar with ``cells`` cells along its length. Its first ``stiff`` mm are a thousand times as stiff as the rest."""
     mesh, laws = shapes.box((cells, 1, 1), SIZE, ELEMENTS[element][0]), []
     for region, factor in (("tendon", RATIO), ("not tendon", 1.0)):
         laws.append(make("neo_hooke", mu=factor * MU, **{"in": region}))
@@ -48,7 +48,7 @@ def force(lab: Lab, cells: int, element: str, width: float, stiff: float = STIFF
 
 
 def truth(width: float) -> float:
-    """The force [N] of the closed form."""
+    """The force [N] according to the closed form."""
     return float(series.stress(MU, BULK, RATIO, (STIFF, width, SIZE[0]), LONGER * SIZE[0])) * SIZE[1] * SIZE[2]
 
 
@@ -63,7 +63,7 @@ ALIGNED = Entry(
     truth=partial(truth, 0.0),
     relative=True,
     within=1e-10,
-    because="The element represents displacements that are linear in each part: Newton's residual of 1e-11 N remains, at 0.15 N.",
+    because="The element represents displacements that are linear in each part; the residual of 1e-11 N remains, at 0.15 N.",
     kind="closed form",
     source="Equal nominal stress in both parts (validation/series.py).",
 )
@@ -76,8 +76,8 @@ ENTRIES = (
         title="Bar of two materials in series, one a thousand times as stiff, with an interface on cell faces, with P2/P1: force",
         given={"cells": 10, "element": "P2/P1", "width": 0.0},
         within=1e-6,
-        because="The exact pressure jumps at the interface; the discrete one is continuous and oscillates in the cells next to it. "
-        "The stiff cells hardly deform under any pressure; a relative error of about 1 / ratio^2 remains.",
+        because="The exact pressure jumps at the interface; the discrete pressure is continuous and oscillates in the cells next "
+        "to it. The stiff cells hardly deform under any pressure; a relative error of about 1 / ratio^2 remains.",
     ),
     replace(
         ALIGNED,
@@ -87,7 +87,7 @@ ENTRIES = (
         **control("No transition.", width=0.0),
         truth=partial(truth, WIDTH),
         within=5e-5,
-        because="The energy, and with it the force, converges at order 4 with quadratic cells, down to 0.25 mm.",
+        because="The energy, and with it the force, converges at order 4 with quadratic cells, down to cells of 0.25 mm.",
         refinement=Refinement((10, 20, 40), SIZE[0], 4.0),
     ),
 )

@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 # The time [s] within which a signal to all processes, after it has ended the process of a lab, reaches this process too.
 HEARD = 0.5
-# Errors that fail one entry while the others go on; any other is a bug in this package, or an interrupt.
+# Errors that make one entry fail while the other entries go on. Any other error is a bug in this package, or an interrupt.
 FAILURES = (InputError, ValueError, ArithmeticError, LookupError, RuntimeError, OSError)
 
 
@@ -35,7 +35,7 @@ def entries() -> dict[str, Entry]:
 
 
 def collect(modules: Iterable[ModuleType]) -> dict[str, Entry]:
-    """The ``ENTRIES`` of ``modules`` by their names; a module without them has none."""
+    """The ``ENTRIES`` of ``modules`` by their names; a module without ``ENTRIES`` contributes none."""
     found: dict[str, Entry] = {}
     for module in modules:
         for entry in getattr(module, "ENTRIES", ()):
@@ -46,8 +46,8 @@ def collect(modules: Iterable[ModuleType]) -> dict[str, Entry]:
 
 
 def choose(catalogue: dict[str, Entry], wanted: Iterable[str], place: str) -> tuple[str, ...]:
-    """The names of the ``wanted`` entries, in the order of the catalogue: names of entries or groups, or shell
-    patterns of them. InputError naming ``place`` if one matches nothing.
+    """The names of the entries that ``wanted`` selects, in the order of the catalogue. ``wanted``: names of entries or groups, or
+    shell patterns. Raises InputError naming ``place`` if one of them matches nothing.
     """
     chosen: set[str] = set()
     for text in wanted:
@@ -71,11 +71,11 @@ def run(
     make_lab: Callable[[], AbstractContextManager[Lab]],
     with_negative_control: frozenset[str] = frozenset(),
 ) -> tuple[Result, ...]:
-    """The results of the entries, in their order; those whose names are in ``with_negative_control`` are measured with their
+    """The results of the ``wanted`` entries, in this order. Entries named in ``with_negative_control`` are measured with their
     negative control.
 
-    Two entries run at a time if there are two cores, each thread with its own lab. The labs are closed even after an error. Entries
-    whose labs an interrupt or an error ends have no result.
+    Two entries run at a time if there are two cores, each in a thread with its own lab. The labs are closed even after an error. An
+    entry whose lab is ended by an interrupt or an error has no result.
     """
     ended = threading.Event()
     begin, reporting, done = time.perf_counter(), threading.Lock(), count(1)
@@ -93,7 +93,7 @@ def run(
 
 
 def _measured(entry: Entry, lab: Lab, *, with_negative_control: bool) -> Result:
-    """The result of an entry; if it raised an error, its value or truth is NaN and its note states the error."""
+    """The result of an entry; after an error, its value or truth is NaN and its note states the error."""
     begin = time.perf_counter()
     try:
         finding = entry.find(lab, with_negative_control=with_negative_control)

@@ -30,7 +30,7 @@ def _slides(direction: list[float], distance: str) -> dict[str, object]:
 
 
 def bar(ball: str = "2 mm") -> MuscleProblem:
-    """A bar of 10 x 10 x 40 mm between two bones, one of which moves by 3 mm; a sphere of radius 3 mm moves into it by ``ball``."""
+    """A bar of 10 x 10 x 40 mm between two bones, one of which moves by 3 mm. A sphere of radius 3 mm moves into it by ``ball``."""
     ball_bone = {"sphere": {"centre": "-3.2, 5, 20 mm", "radius": "3 mm"}, "motion": _slides([1, 0, 0], ball)}
     hold = [{"face": "z0"}, {"face": "z1", "motion": _slides([0, 1, 0], "3 mm")}]
     table = {
@@ -67,7 +67,7 @@ def solved(lab: Lab) -> tuple[MuscleProblem, Run]:
 
 
 def denials(lab: Lab, mistake: Mistake | None = None) -> Finding:
-    """The number of checks that the run, or the run with a deliberate mistake, fails."""
+    """The number of checks that the run fails, after a deliberate ``mistake`` if one is given."""
     problem, run = solved(lab)
     lost = [str(one) for one in of_muscle(*(mistake(problem, run) if mistake else (problem, run))) if not one.met]
     return Finding(float(len(lost)), note="; ".join(lost))
@@ -79,7 +79,7 @@ def missing(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
 
 
 def moved(frame: int, place: Vector, by: Vector) -> Mistake:
-    """A mistake: in one frame, the vertex that is at ``place`` at rest is displaced ``by`` a vector [mm]."""
+    """A mistake: in one ``frame``, the vertex that is at ``place`` at rest is displaced ``by`` a vector [mm]."""
 
     def mistake(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
         positions = run.positions.copy()
@@ -111,7 +111,7 @@ def touching_denials(lab: Lab, farther: float = 0.0) -> Finding:
 
 
 def unbalanced(lab: Lab, lost: float = 0.0) -> Finding:
-    """The number of balance checks that the pressed blocks fail if the fraction ``lost`` of the driving force is missing."""
+    """The number of balance checks that fail for the pressed blocks if the fraction ``lost`` of the driving force is missing."""
     body = pressed_blocks(BLOCK_STIFFNESS)
     run = lab.solve(body, "P2/P1", first_step=0.5)
     forces = run.last.forces | {"high_z1": (1 - lost) * run.last.forces["high_z1"]}

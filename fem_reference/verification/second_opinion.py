@@ -1,8 +1,8 @@
 """FEniCSx and scikit-fem on the same bodies, and the linear solvers of FEniCSx, which must not change the solution.
 
-FEniCSx and scikit-fem share no assembly, no derivatives and no linear algebra. Their discretisations are the same, so their states
-differ by Newton's residual and, where quadrature is not exact, by their rules: both use Gauss-Legendre in hexahedra, but different
-points in tetrahedra, where the difference vanishes as the degree of the rules increases.
+FEniCSx and scikit-fem share no assembly, no derivatives and no linear algebra. Their discretisations are the same. Their states
+differ by Newton's residual and, where quadrature is not exact, because of different rules: both solvers use Gauss-Legendre points
+in hexahedra, but different points in tetrahedra, where the difference vanishes as the degree of the rules increases.
 """
 
 from collections.abc import Callable
@@ -36,9 +36,10 @@ def stiffer(body: Body, error: float) -> Body:
 def agreement(
     lab: Lab, body: Callable[[], Body], element: str, residual: float, quadrature: int | None, error: float = 0.0
 ) -> Finding:
-    """The largest of the relative differences of :func:`differences`.
+    """The largest of the relative differences that :func:`differences` returns.
 
-    ``residual`` [N, mm3]; ``quadrature``: the degree of both rules, or None for the defaults; ``error``: of scikit-fem's modulus.
+    ``residual`` [N, mm3]; ``quadrature``: the degree of both rules, or None for the defaults; ``error``: the relative error of the
+    modulus in scikit-fem.
     """
     settings: dict[str, float] = {"first_step": 0.5, "residual": residual}
     if quadrature is not None:
@@ -52,8 +53,8 @@ def agreement(
 
 
 def differences(first: Frame, second: Frame, rest: Floats) -> dict[str, float]:
-    """The relative differences between two states of a body: of node positions, relative to the largest displacement from ``rest``
-    (n, 3); of energies; and of forces and moments, relative to the largest component.
+    """The relative differences between two states of a body: in node positions, relative to the largest displacement from ``rest``
+    (n, 3) [mm]; in the energy; and in forces and moments, relative to the largest component.
     """
     return {
         "positions": parts.farthest(second.points, first.points) / parts.farthest(first.points, rest),
@@ -71,17 +72,17 @@ def _difference(first: dict[str, Floats], second: dict[str, Floats]) -> float:
 def built(
     acting: tuple[Effect, ...], mesh: Callable[..., Cells], prescribed: tuple[Prescribed, ...], element: str
 ) -> Body:
-    """A body with the ``acting`` effects and a resistance to volume change; ``mesh`` makes cells of the kind of ``element``."""
+    """A body with the ``acting`` effects and a resistance to volume change; ``mesh`` creates cells of the kind of ``element``."""
     acting = (*acting, parts.resistance(element, 1.0))
     return Body(mesh(kind=ELEMENTS[element][0]), acting, prescribed, (0.0, 1.0), Along((2 / 7, 3 / 7, 6 / 7)))
 
 
-# Newton's method ends at this [N, mm3]; the softest mode of the bar has a stiffness of about mu w^4 / l^3 = 0.006 N/mm.
+# Newton's method ends at this residual [N, mm3]. The softest mode of the bar has a stiffness of about mu w^4 / l^3 = 0.006 N/mm.
 RESIDUAL = 1e-11
 
 
 def turned_bar(lab: Lab, solver: str, precision: str | None, residual: float) -> Floats:
-    """A bar of muscle, one end clamped, the other turned by 1 rad about an oblique axis: its deformed nodes (n, 3) [mm]."""
+    """The deformed nodes (n, 3) [mm] of a bar of muscle, one end clamped and the other turned by 1 rad about an oblique axis."""
     mesh = shapes.box((3, 3, 7), (10.0, 10.0, 25.0), "tetrahedron")
     passive = make("fibre_passive", stress="300 kPa", p1=0.05, p2=6.6, optimal_stretch=1.0, linear_from=1.4)
     turned = Prescribed("z1", "z1", (0, 1, 2), Turn((1.0, 0.0, 2.0), 1.0, (5.0, 5.0, 12.5)))
@@ -92,7 +93,7 @@ def turned_bar(lab: Lab, solver: str, precision: str | None, residual: float) ->
 
 
 def difference(lab: Lab, solver: str, precision: str | None = None, residual: float = RESIDUAL) -> float:
-    """The largest distance [mm] of a node from its position according to the direct solver in double precision."""
+    """The largest distance [mm] of a node from its position as computed by the direct solver in double precision."""
     return parts.farthest(turned_bar(lab, "direct", "double", RESIDUAL), turned_bar(lab, solver, precision, residual))
 
 
@@ -112,26 +113,27 @@ BAR = partial(shapes.box, (2, 2, 4), (1.0, 1.0, 2.0))
 SHORT_BAR = partial(shapes.box, (1, 1, 2), (1.0, 1.0, 2.0))
 BLOCK = partial(shapes.warped_box, (2, 2, 2), (1.0, 1.0, 1.0))
 CURVED_BLOCK = partial(BLOCK, degree=2)
-# An axis between that of the bar, z, and one across it: the turn bends and twists at once.
+# The axis lies between the bar's own axis, z, and a direction across the bar, so that the turn bends and twists the bar.
 TURNED = (*parts.clamped("z0"), Prescribed("z1", "z1", (0, 1, 2), Turn((1.0, 0.0, 2.0), 0.5, (0.5, 0.5, 2.0))))
 STANDING = (*parts.clamped("z0"), Prescribed("y0", "y0", (1,), Rest(), stiffness=0.01))
 PULLED = (*parts.SYMMETRY, Prescribed("z1", "z1", (2,), Affine(parts.NO_GRADIENT, (0.0, 0.0, 0.6))))
 
 REMAINS = "Newton's residual of 1e-14 N, at forces of about 1e-3 N, and rounding remain"
-ALIKE = "both integrate by the same Gauss-Legendre rule, so that"
+ALIKE = "both integrate by the same Gauss-Legendre rule, so that only"
 SAME_RULE = f"{ALIKE} {REMAINS}"
 CONSTANT = f"F is constant in a cell, so that every rule is exact: {REMAINS}"
 BAR_RULES = (
-    "their quadrature rules differ, here of degree 9; with P2/P1 this bar differs by 3e-6 at degree 4, 3e-7 at 6, "
-    "1e-9 at 8 and 2e-11 at 9"
+    "the solvers use different quadrature rules, here of degree 9; with P2/P1 the results for this bar differ by 3e-6 at "
+    "degree 4, 3e-7 at 6, 1e-9 at 8 and 2e-11 at 9"
 )
 BLOCK_RULES = (
-    "their quadrature rules differ, here of degree 9; this block differs by 4e-6 at degree 4, 1e-11 at 8 and 4e-14 at 9"
+    "the solvers use different quadrature rules, here of degree 9; the results for this block differ by 4e-6 at degree 4, "
+    "1e-11 at 8 and 4e-14 at 9"
 )
 
 
 class Tolerance(NamedTuple):
-    """Tolerance of an entry and its reason; ``residual`` in N and mm3; ``quadrature``: a degree, None for each solver's own."""
+    """The tolerance of an entry and its reason; ``residual`` [N, mm3]; ``quadrature``: a degree, None for each solver's default."""
 
     within: float
     because: str
@@ -160,7 +162,7 @@ BY_GAUSS = Tolerance(1e-9, f"{ALIKE} Newton's residual of 1e-8 N, at forces of 5
 
 
 def opinion(name: str, title: str, body: Callable[[], Body], element: str, tolerance: Tolerance) -> Entry:
-    """The entry of a body that both solvers solve."""
+    """The entry for a body that both solvers solve."""
     return Entry(
         name=f"second_opinion_{name}",
         group="second opinion",
@@ -178,7 +180,7 @@ def opinion(name: str, title: str, body: Callable[[], Body], element: str, toler
 
 
 def specimen(name: str, words: str, block: Specimen) -> Entry:
-    """The entry of a block of the groups homogeneous, fibres or loads; ``words`` follow "A block" in its title."""
+    """The entry for a block of the groups homogeneous, fibres or loads; ``words`` follow "A block" in its title."""
     return opinion(name, f"A block {words}", block.body, block.element, STEEPER)
 
 

@@ -35,12 +35,12 @@ LOWEST = 0.5  # the smallest V/V0 in the range of the law
 
 
 def bulk_modulus(poisson: float) -> float:
-    """The bulk modulus [MPa] of a material with the shear modulus ``MU`` [MPa]."""
+    """The bulk modulus [MPa] of a material with the shear modulus ``MU`` [MPa] and Poisson's ratio ``poisson``."""
     return 2 * MU * (1 + poisson) / (3 * (1 - 2 * poisson))
 
 
 def plated(lab: Lab, element: str, bulk: float, path: Affine, numbers: tuple[float, ...], **settings: Any) -> Run:
-    """The states of an eighth of a cube, free at its sides, whose smooth plate follows a ``path``, at the frames ``numbers``."""
+    """The states, at the frames ``numbers``, of an eighth of a cube with free sides, whose smooth plate follows a ``path``."""
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
     body = Body(mesh, neo_hooke(MU, bulk, element), (*SYMMETRY, Prescribed("plate", "z1", (2,), path)), numbers)
     return lab.solve(body, element, smallest_step=1e-3, residual=RESIDUAL, **settings)
@@ -57,7 +57,7 @@ def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: 
 
 
 def _finding(value: float, states: tuple[Frame, ...]) -> Finding:
-    """The finding, with a note on the Newton iterations of the squeeze and the smallest det F of all its states."""
+    """The finding, with a note on the number of Newton iterations and the smallest det F in all ``states``."""
     scalars = [state.scalars for state in states]
     smallest = min(min(one["min_det_F_quadrature"], one["min_det_F_vertices"]) for one in scalars)
     iterations = sum(one["newton_iterations"] for one in scalars)
@@ -65,7 +65,7 @@ def _finding(value: float, states: tuple[Frame, ...]) -> Finding:
 
 
 def force(lab: Lab, element: str, bulk: float) -> Finding:
-    """The force of the plate at a tenth of the height [N]."""
+    """The force [N] of the plate at a tenth of the height."""
     states = smooth(lab, element, bulk)
     return _finding(float(states[STEPS].forces["plate"][2]), states)
 
@@ -77,7 +77,7 @@ def volume(lab: Lab, element: str, bulk: float) -> Finding:
 
 
 def distance_from_rest(lab: Lab, element: str, bulk: float, *, growing: bool, back: float = 1.0) -> Finding:
-    """The largest distance [mm] of a node from rest when the plate is at the fraction ``back`` of its return."""
+    """The largest distance [mm] of a node from its rest position when the plate is at the fraction ``back`` of its return."""
     states = smooth(lab, element, bulk, growing=growing, back=back)
     return _finding(farthest(states[-1].points, states[0].points), states)
 
@@ -90,8 +90,8 @@ def squeezed(lab: Lab, element: str, poisson: float, stretches: tuple[float, ...
 
 
 def collapses(lab: Lab, element: str, poisson: float) -> Finding:
-    """1 if the squeeze stops before its end, keeps no state below a fifth of the volume, and names the law outside its range; else
-    0. Newton's method finds a collapsed state or, as the steep branch towards it folds back, none.
+    """Return 1 if the squeeze stops before its end, keeps no state below a fifth of the volume, and names the law outside its
+    range; otherwise 0. Newton's method finds a collapsed state or, as the steep branch towards it folds back, no state.
     """
     solved = squeezed(lab, element, poisson, tuple(1 - frame for frame in frames(1 - HEIGHT, 6)))
     least = min(state.scalars["min_cell_volume_ratio"] for state in solved.states)
@@ -108,7 +108,7 @@ def outside(lab: Lab, element: str, poisson: float) -> Finding:
 
 
 def glued(lab: Lab, element: str, count: int, height: float, **settings: Any) -> Run:
-    """The states of a cube with ``count`` cells a side between plates to which it sticks, down to a ``height``."""
+    """The states of a cube with ``count`` cells along each side, between plates to which it sticks, down to a ``height``."""
     mesh = shapes.box((count,) * 3, (1.0, 1.0, 1.0), ELEMENTS[element][0])
     top = Prescribed("top", "z1", (0, 1, 2), Affine(NO_GRADIENT, (0.0, 0.0, height - 1)))
     body = Body(mesh, neo_hooke(MU, 10.0), (*clamped("z0"), top), frames(1, GLUED_STEPS))
@@ -125,14 +125,14 @@ def _end_note(solved: Run, height: float) -> str:
 
 
 def inverts(lab: Lab, element: str, count: int, height: float) -> Finding:
-    """1 if the squeeze ends with the status "inverted" in a state at which Newton's method converged, else 0."""
+    """Return 1 if the squeeze ends with the status "inverted" in a state at which Newton's method converged, otherwise 0."""
     solved = glued(lab, element, count, height)
     found = solved.outcome.status == "inverted" and "Newton's method converged" in solved.outcome.message
     return Finding(float(found), note=_end_note(solved, height))
 
 
 def stays_upright(lab: Lab, element: str, count: int, height: float, **settings: Any) -> Finding:
-    """1 if the squeeze reaches its end with det F above zero at every checked point, else 0."""
+    """Return 1 if the squeeze reaches its end with det F above zero at every checked point, otherwise 0."""
     solved = glued(lab, element, count, height, **settings)
     scalars = solved.states[-1].scalars
     smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])

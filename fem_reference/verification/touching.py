@@ -42,7 +42,7 @@ def pressed_blocks(stiffness: float, apart: float = 0.0) -> Body:
 
 
 def blocks(lab: Lab, stiffness: float, *, itself: bool = False) -> Finding:
-    """The force [N] between the pressed blocks; their faces are two surfaces, or one surface that touches ``itself``."""
+    """The force [N] between the pressed blocks. Their faces are two surfaces, or one surface that touches ``itself``."""
     body = pressed_blocks(stiffness, SMOOTHING if itself else 0.0)
     if itself:  # the gap at rest then equals the smoothing, so there is no pressure at rest
         (law,), facets = body.touching, body.mesh.facets
@@ -55,7 +55,7 @@ def blocks(lab: Lab, stiffness: float, *, itself: bool = False) -> Finding:
 
 
 def _quarter(n: int) -> Cells:
-    """A quarter of a large body, z >= 0, with ``n`` cells in its core and larger cells outside; "near" is the middle of z0."""
+    """A quarter of a large body, z >= 0, with ``n`` cells in its core and larger cells outside; "near" is the centre of z0."""
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
     flat = mesh.facets["z0"]
     near = np.linalg.norm(mesh.points[flat][..., :2], axis=2).max(axis=1) < FLAT
@@ -63,7 +63,9 @@ def _quarter(n: int) -> Cells:
 
 
 def pressed(lab: Lab, n: int, radius: float) -> Frame:
-    """A quarter of a flat body below z = 0 and of a body above it with a bump of ``radius`` [mm]; far ends approach by APPROACH."""
+    """The final state of a quarter of two bodies: a flat one below z = 0, and one above it with a bump of ``radius`` [mm]. Their
+    far ends approach each other by APPROACH.
+    """
     low, high = _quarter(n), _quarter(n + 1)
     away = np.hypot(high.points[:, 0], high.points[:, 1])
     beyond = FLAT**2 / (2 * radius) + FLAT**2 / radius * np.tanh((away - FLAT) / FLAT)  # far from the contact
@@ -82,7 +84,7 @@ READINGS = contact.ball_readings("low_near on high_near")
 
 
 def ball(lab: Lab, reading: str, radius: float) -> Finding:
-    """A reading of the pressed bodies."""
+    """A ``reading`` of the pressed bodies."""
     state = pressed(lab, 3, radius)
     return Finding(
         READINGS[reading](state), note=f"they overlap by {1000 * state.scalars['touching_depth']:.1f} micrometres"
@@ -108,7 +110,7 @@ ENTRIES = (
             **control("contact 1 % stiffer", stiffness=1.01 * BLOCK_STIFFNESS),
             truth=partial(contact.in_series, SOFT, BLOCK_STIFFNESS, TRAVEL),
             within=2e-4,
-            because="quadrature on one mesh is not exact for functions of the other: errors of 6e-5 in force, 2 % in pressure",
+            because="quadrature on one mesh is not exact for functions on the other: errors of 6e-5 in force, 2 % in pressure",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
         )
         for name, words in (("blocks_p2_p1", ""), ("blocks_as_one", ", as one surface that touches itself"))
@@ -118,7 +120,7 @@ ENTRIES = (
         "An elastic ball pressed against a large body of the same material: {}",
         ball,
         known_ball,
-        "discretisation and overlap add about 1 %, strains of 0.1 and the finite size of the bodies less",
+        "discretisation and overlap add about 1 %; strains of 0.1 and the finite size of the bodies add less",
         READINGS,
     ),
 )

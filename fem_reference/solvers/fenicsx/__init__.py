@@ -1,7 +1,7 @@
 """The reference: P2 displacement, P1 pressure (Taylor-Hood) on tetrahedra, quasi-static, solved by Newton's method in FEniCSx.
 
-This module needs no FEniCSx. ``session`` runs ``worker`` in a subprocess (``mpiexec`` for more than one rank), gives it the problem
-as a file, and passes on each frame that it reports. A worker that dies gives the status *crashed*, not an exception.
+This module itself does not import FEniCSx. ``session`` runs ``worker`` in a subprocess (under ``mpiexec`` for more than one rank),
+passes the problem to it in a file, and hands on each frame that it reports. If the worker dies, the status is *crashed*.
 """
 
 import logging
@@ -47,15 +47,15 @@ __all__ = ["BodySettings", "FieldSettings", "Settings", "session", "shared", "so
 
 
 def require(settings: BodySettings | FieldSettings) -> None:
-    """Raise MissingSoftware if FEniCSx or the ``mpiexec`` for the ranks is missing, InputError for too many ranks."""
+    """Raise MissingSoftware if FEniCSx (or, for several ranks, ``mpiexec``) is missing, and InputError for too many ranks."""
     require_installed()
     if isinstance(settings, Settings):
         command_line(settings.ranks or 1)
 
 
 def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -> None:
-    """Raise InputError for a key below ``place`` unless the laws resist shear and a change of volume, the element suits tetrahedra
-    and the effects, and the number of ranks suits the linear solver.
+    """Raise InputError for a key below ``place`` unless the laws resist both shear and a change of volume, the element suits
+    tetrahedra and the effects, and the number of ranks suits the linear solver.
     """
     if any(isinstance(one, MuscleContact) for one in effects):
         _check_touching(settings, place)
@@ -66,16 +66,16 @@ def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -
 
 
 def solve(problem: AnyMuscle, settings: Settings, sink: Sink) -> Outcome:
-    """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
+    """Solve every requested frame in worker processes. Each frame contains the surface, the fibres and the tets."""
     require(settings)
     return _solve(problem, settings, sink, None)
 
 
 def go_on(problem: AnyMuscle, settings: Settings, sink: Sink, cut_off: CutOff) -> Outcome:
-    """Continue from the last stored frame of a run that was cut off, and delete earlier states that are not used again."""
+    """Continue an interrupted run from its last stored frame, and delete earlier states that are no longer needed."""
     require(settings)
     there = kept(cut_off, problem.body)
-    again = settings.reuse and not _has_steps(problem)  # True if earlier states may be used again
+    again = settings.reuse and not _has_steps(problem)  # True if earlier states may be reused
     if there.frames:
         log.info("an earlier run was interrupted; continuing from its stored frames, up to frame %d", there.frames[-1])
 
@@ -93,7 +93,7 @@ def _solve(problem: AnyMuscle, settings: Settings, sink: Sink, kept: Kept | None
     describe = _describing(problem, settings)
     passed: list[float] = list(kept.frames) if kept else []
 
-    def pass_on(frame: Frame) -> None:  # frames of the relaxation before the first requested one are dropped
+    def pass_on(frame: Frame) -> None:  # drops frames of the relaxation before the first requested frame
         if frame.number in problem.frames:
             described = describe(frame, is_first=not passed)
             sink(described if chosen.store_state else replace(described, state=None))
@@ -113,7 +113,7 @@ class _Describe(Protocol):
 
 
 def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
-    """A function that adds a note and scalars to a frame; with several muscles, a scalar is named ``<muscle>.<scalar>``."""
+    """The function that adds a note and scalars to a frame. With several muscles each scalar is named ``<muscle>.<scalar>``."""
     if isinstance(problem, MuscleProblem):
         return partial(_described, problem, loads=_are_known(problem, settings))
     spans, names = problem.spans, tuple(problem.problems)
@@ -125,7 +125,7 @@ def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
             others = tuple(name for name in names if name != span.name)
             part = frame_of(frame, span, others)
             one = each[span.name](part, is_first=is_first)
-            assert part.state is not None  # of a muscle
+            assert part.state is not None  # a muscle's frame has a state
             own[f"{span.name}.volume_ratio"] = volume_ratio(problem.problems[span.name].mesh, part.state)
             new = {key: value for key, value in one.scalars.items() if key not in frame.scalars}
             for other in others:
@@ -138,7 +138,7 @@ def _describing(problem: AnyMuscle, settings: Settings) -> _Describe:
 
 
 def _on_other(frame: Frame, name: str, other: str) -> dict[str, float]:
-    """The components of the force and the moment of the muscle ``name`` on the ``other``, if the two may touch."""
+    """The components of the force and moment that muscle ``name`` exerts on muscle ``other``; empty if they cannot touch."""
     found, key = dict[str, float](), force_between(name, other)
     for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):
         if key in vectors:
@@ -147,8 +147,8 @@ def _on_other(frame: Frame, name: str, other: str) -> dict[str, float]:
 
 
 def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
-    """True if external loads act and can be computed from the deformed shape alone, exactly as the solver integrates them. They
-    are quadratic in the shape, so the solver's quadrature must have degree 4 or above.
+    """True if external loads act and can be computed from the deformed shape alone, exactly as the solver integrates them. The
+    loads are quadratic in the shape, so the solver's quadrature must have degree 4 or above.
     """
     exact = settings.quadrature_degree is None or settings.quadrature_degree >= 4
     still = np.zeros((len(problem.mesh.tets), 10, 3))
@@ -157,11 +157,11 @@ def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
 
 
 def _loads(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
-    """The components of the external load on the muscle, ``load_force_`` [N], and of its moment about the origin, ``load_moment_``
-    [N mm], computed from the shape alone, without the solver's forms.
+    """The components of the external force on the muscle, ``load_force_`` [N], and of its moment about the origin, ``load_moment_``
+    [N mm]. Both are computed from the deformed shape alone, without the solver's forms.
     """
     state = frame.state
-    assert state is not None  # of a muscle
+    assert state is not None  # a muscle's frame has a state
     by, since = quadratic(state.displacement), state.displacement - state.before if len(state.before) else None
     load = external_load(problem, frame.number, by, None if since is None else state.rate * quadratic(since))
     assert load is not None  # ``_are_known`` ensures it
@@ -169,8 +169,8 @@ def _loads(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
 
 
 def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: bool) -> Frame:
-    """The frame with a note and more scalars: the magnitudes [N, N mm] of each force and of the sums of forces and of moments, the
-    forces on bones, the ``loads`` if they are known, errors of attachments, and stresses.
+    """Add a note and scalars to the frame: the magnitude of each force and of the net force [N], the magnitude of the net moment
+    [N mm], forces and moments on bones, errors of attachments, stresses and, if ``loads`` is true, the external load.
     """
     scalars = frame.scalars
     smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])
@@ -187,7 +187,7 @@ def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: b
     for kind, vectors in (("force", frame.forces), ("moment", frame.moments)):
         pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(list(vectors.values()), axis=0)))
         pulls |= _on_bones(problem, kind, vectors)
-    assert frame.state is not None  # of a muscle
+    assert frame.state is not None  # a muscle's frame has a state
     results = Results(problem.mesh, problem.effects, {frame.number: frame.state}, problem.directions, problem.regions)
     own = pulls | _attachment_errors(problem, frame) | stress_scalars(results, frame.number)
     return replace(frame, note=note, scalars=scalars | own)
@@ -195,7 +195,7 @@ def _described(problem: MuscleProblem, frame: Frame, *, loads: bool, is_first: b
 
 def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> dict[str, float]:
     """The components of the force or the moment (``kind``) that the muscle exerts on each bone: minus the sum of the ``vectors``
-    (3,) that act on the muscle at its attachments and by contact.
+    (3,) that act on the muscle at its attachments to the bone and through contact with it.
     """
     found = dict[str, float]()
     for bone in problem.bones:
@@ -208,9 +208,9 @@ def _on_bones(problem: MuscleProblem, kind: str, vectors: dict[str, Floats]) -> 
 
 
 def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
-    """The distance between attached surface vertices and their targets on the bones, ``attachment_error_rms`` and
-    ``attachment_error_max`` [mm]. The distance is not zero, as springs yield, and exact attachments are facets of tets, which
-    follow the vertices only approximately. Empty if nothing is attached.
+    """The rms and the maximum of the distance between attached surface vertices and their targets on the bones,
+    ``attachment_error_rms`` and ``attachment_error_max`` [mm]; empty if nothing is attached. The distance is not zero: springs
+    yield, and exact attachments are prescribed on facets of tets, which follow the surface vertices only approximately.
     """
     surface = frame.surface
     if not problem.attached or surface is None:
@@ -224,8 +224,8 @@ def _attachment_errors(problem: MuscleProblem, frame: Frame) -> dict[str, float]
 
 
 def _samples(problem: AnyMuscle) -> dict[str, tuple[Ints, Floats]]:
-    """The points at which displacements are sampled: by name, the tet of each point and its position at rest."""
-    if isinstance(problem, MusclesProblem):  # each sampled in its own muscle, even if another is very close
+    """The points at which displacements are sampled, by name: the tet (n,) and the rest position (n, 3) [mm] of each point."""
+    if isinstance(problem, MusclesProblem):  # sample each point in its own muscle, even if another muscle is very close
         each = [_samples(one) for one in problem.problems.values()]
         starts = [span.cells.start for span in problem.spans]
         return {
@@ -261,12 +261,12 @@ def _planned(problem: AnyMuscle, settings: Settings) -> Settings:
 
 
 def _has_steps(problem: AnyMuscle) -> bool:
-    """True if an effect depends on velocities."""
+    """True if an effect depends on velocities and therefore on the load steps."""
     return any("interval" in effect.needs for effect in problem.body.effects)
 
 
 def _check_touching(settings: Settings, place: str) -> None:
-    """Raise InputError below ``place`` if the settings do not suit muscles that touch each other."""
+    """Raise InputError for a key below ``place`` if the settings do not support touching muscles."""
     if (settings.ranks or 1) > 1:
         want = "1, as several muscles and muscles that touch themselves are solved on one rank"
         raise InputError(join(place, "ranks"), settings.ranks, want)
@@ -295,4 +295,4 @@ SOLVES = (
     FieldSolver(settings=FieldSettings, solve=solve_scalar, example={}, require=require, slow=True),
     BodySolver(settings=BodySettings, solve=solve_on, example={}, require=require, slow=True),
 )
-solve_field = SOLVES[1].run  # in memory
+solve_field = SOLVES[1].run  # stores nothing

@@ -21,12 +21,12 @@ from dolfinx.fem.petsc import apply_lifting, assemble_matrix, assemble_vector, s
 from mpi4py import MPI  # isort: skip
 from fem_reference.solvers.fenicsx import compiling, meshes  # isort: skip
 
-QUADRATURE_DEGREE = 8  # as in scikit_fem, which uses 3 points on the boundary
+QUADRATURE_DEGREE = 8  # as in scikit_fem, whose rule on the boundary has 3 points
 FACET_DEGREE = 5
 
 
 def equations(problem: FieldProblem) -> tuple[Any, Any, Any, Ints]:
-    """The compiled bilinear and linear forms, the space, and the problem's node at each unknown (N,)."""
+    """The compiled bilinear form, the compiled linear form, the function space, and the problem's node (N,) at each unknown."""
     msh = distribute(problem)
     space = fem.functionspace(msh, ("Lagrange", problem.order))
     psi, test = _state(ufl.TrialFunction(space)), _state(ufl.TestFunction(space))
@@ -47,7 +47,7 @@ def equations(problem: FieldProblem) -> tuple[Any, Any, Any, Ints]:
 
 
 def distribute(problem: FieldProblem) -> mesh.Mesh:
-    """The problem's mesh: intervals on a line, triangles in the plane or in space."""
+    """The problem's mesh in DOLFINx: intervals on a line, or triangles in the plane or in space."""
     points, cells = problem.mesh.points, problem.mesh.cells
     shape = "interval" if cells.shape[1] == 2 else "triangle"
     element = basix.ufl.element("Lagrange", shape, 1, shape=(points.shape[1],))
@@ -55,7 +55,7 @@ def distribute(problem: FieldProblem) -> mesh.Mesh:
 
 
 def nodes(space: Any, problem: FieldProblem) -> Ints:
-    """The problem's node (N,) at each unknown of ``space``."""
+    """The problem's node (N,) at each unknown of the ``space``."""
     msh, layout, count = space.mesh, space.dofmap.dof_layout, len(problem.mesh.points)
     corners = np.asarray(msh.geometry.input_global_indices)[msh.geometry.dofmap]
     found = np.empty(space.dofmap.index_map.size_local, np.int64)
@@ -69,7 +69,7 @@ def nodes(space: Any, problem: FieldProblem) -> Ints:
 
 
 def solve(problem: FieldProblem) -> tuple[Floats, Outcome]:
-    """The values (N,) in the order of the problem's nodes, NaN after a failure, and the outcome."""
+    """The nodal values (N,) in the order of the problem's nodes (NaN after a failure), and the outcome."""
     begin = time.perf_counter()
     forget_peak_memory()
     left, right, space, node = equations(problem)
@@ -93,14 +93,14 @@ def _state(function: Any) -> FieldState:
 
 
 def _by_cell(msh: mesh.Mesh, values: Floats) -> fem.Function:
-    """The function that is constant on each cell, with the ``values`` (m,) of the problem's cells."""
+    """The piecewise constant function that takes the ``values`` (m,) on the problem's cells."""
     function = fem.Function(fem.functionspace(msh, ("Discontinuous Lagrange", 0)))
     function.x.array[function.function_space.dofmap.list[:, 0]] = values[msh.topology.original_cell_index]
     return function
 
 
 def _assembled(left: Any, right: Any, space: Any, fixed: Floats) -> tuple[Any, Any]:
-    """Matrix and right-hand side; an unknown with a value in ``fixed`` (N,), which is NaN for free unknowns, is set to it."""
+    """The matrix and the right-hand side. Each unknown whose entry in ``fixed`` (N,) is not NaN is set to that value."""
     values = fem.Function(space)
     values.x.array[:] = np.nan_to_num(fixed)
     conditions = [fem.dirichletbc(values, np.flatnonzero(~np.isnan(fixed)).astype(np.int32))]
@@ -113,7 +113,7 @@ def _assembled(left: Any, right: Any, space: Any, fixed: Floats) -> tuple[Any, A
 
 
 def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
-    """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and the reason if there is none."""
+    """The solution (N,) of ``A x = b`` by MUMPS's sparse LU factorisation, and None or the reason why there is no solution."""
     x = A.createVecRight()
     if not np.isfinite(A.norm() + b.norm()):
         return x.array, "the equations contain a number that is not finite; a formula may have no value somewhere"
@@ -125,7 +125,7 @@ def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
     preconditioner.setFactorSolverType("mumps")
     preconditioner.setFactorSetUpSolverType()
     factors = preconditioner.getFactorMatrix()
-    factors.setMumpsIcntl(24, 1)  # find null pivots instead of dividing by rounding errors
+    factors.setMumpsIcntl(24, 1)  # detect null pivots instead of dividing by rounding errors
     solver.solve(b, x)
     error, null_pivots = factors.getMumpsInfog(1), factors.getMumpsInfog(28)
     if null_pivots:

@@ -1,6 +1,6 @@
 """A body in DOLFINx: spaces, the weak form summed from the effects, boundary conditions, and Newton's method.
 
-Every method is collective: all ranks call it and get the same value.
+Every method is collective: all ranks must call it, and all get the same value.
 """
 
 from collections.abc import Callable
@@ -39,7 +39,7 @@ from fem_reference.solvers.fenicsx.validity import Validity
 
 
 class AssembledBody:
-    """The unknowns of a body with an element of ``ELEMENTS``, and their equations."""
+    """The unknowns of a body, discretised with an element of ``ELEMENTS``, and their equations."""
 
     def __init__(self, body: Body, settings: BodySettings) -> None:
         self.comm, self.reuse, self.effects = MPI.COMM_WORLD, settings.reuse and not body.remembers, body.effects
@@ -96,13 +96,13 @@ class AssembledBody:
         return ContactForces(law, body.bones, points, self.unknowns, body.frames[0], self.spent)
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """The trouble *diverged* if the energy has no value in the present state."""
+        """The trouble *diverged* if the energy has no value in the current state."""
         if np.isfinite(self.energy()):
             return None
         return Trouble("diverged", "to a state in which the energy is not a number: a law has no value there")
 
     def start(self, moved: Callable[[Floats], Floats]) -> None:
-        """Begin with the nodes at the positions to which ``moved`` maps their rest points (n, 3) [mm]."""
+        """Begin with the nodes at the positions to which ``moved`` maps their rest positions (n, 3) [mm]."""
         rest = self.displacement.space.tabulate_dof_coordinates()
         self.unknowns.x.array[self.displacement.dofs] = moved(rest) - rest
         self.unknowns.x.scatter_forward()
@@ -116,7 +116,7 @@ class AssembledBody:
         return int(self.unknowns.function_space.dofmap.index_map.size_global)
 
     def attempt(self, frame: float) -> Attempt:
-        """Solve at ``frame`` from the present state, which is restored if Newton's method fails or a check refuses the result."""
+        """Solve at ``frame`` from the current state, which is restored if Newton's method fails or a check rejects the result."""
         before = np.array(self.unknowns.x.array)
         if self.clock.begins():
             self._begin(before)
@@ -133,8 +133,8 @@ class AssembledBody:
         return found
 
     def _settle(self, before: Floats, frame: float) -> None:
-        """Take the present state as the state of ``frame``. ``before`` (n,): the unknowns at the start of its step, from which a
-        halfway state is solved if work and energy disagree.
+        """Accept the current state as the state of ``frame``. ``before`` (n,): the unknowns at the start of the load step; if work
+        and energy disagree, a halfway state is solved from them.
         """
         after, contact, middle = np.array(self.unknowns.x.array), self.system.contact, (self.at + frame) / 2
         looked, restoring = list[bool](), [one.restoring() for one in self.contacts]
@@ -165,16 +165,16 @@ class AssembledBody:
             one.go_back()
 
     def _begin(self, before: Floats) -> None:
-        """Find the initial acceleration of the body at rest, with unknowns ``before``, by a step without motion."""
+        """Find the initial acceleration of the body at rest, with unknowns ``before``, by a step too short for motion."""
         self.clock.instant(before)
         self.set_frame(self.clock.at)
-        self.newton.solve(self.clock.at)  # the tangent is all mass; a failure would show in the first step
+        self.newton.solve(self.clock.at)  # mass dominates the tangent; a failure would show in the first step
         self.clock.begin(self.unknowns.x.array)
         self.go_back(before)
 
     def recall(self, frame: float) -> bool:
-        """Restore an earlier state with the same loads and boundary conditions as at ``frame``, if there is one and no jump leads
-        to it (after a full turn the loads are those at rest, but the state is another). Its residual proves the equilibrium.
+        """Restore an earlier state with the loads and boundary conditions of ``frame`` and return True, if there is one, its
+        residual confirms equilibrium, and no jump leads to it (after a full turn the loads are those at rest, but not the state).
         """
         if self.clock.matters or not self.reuse:
             return False
@@ -184,7 +184,7 @@ class AssembledBody:
         if self.recalled is None:
             return False
         self.unknowns.x.array[:] = self.recalled.unknowns
-        self.unknowns.x.array[:] -= self.system.missing()  # differs by the rounding of a returning motion
+        self.unknowns.x.array[:] -= self.system.missing()  # prescribed values differ by rounding when a motion returns
         if self.contact:
             self.contact.update(frame)
         proved = self.system.residual() <= self.newton.residual and self.path.jumped(before) is None
@@ -195,20 +195,20 @@ class AssembledBody:
         return proved
 
     def arrive(self, frame: float) -> None:
-        """Take the present state, to which no load step led, as the state of ``frame``."""
+        """Accept the current state as the state of ``frame`` although no load step led to it."""
         self.at = frame
         for one in self.contacts:
             one.settle()
         self.path.settle(self.energy(), connected=False)
 
     def know(self, frame: float, unknowns: Floats, modes: float | None) -> None:
-        """Register ``frame`` as solved earlier, with ``unknowns`` (n,) and negative ``modes``."""
+        """Register ``frame`` as solved earlier, with its ``unknowns`` (n,) and its number of negative ``modes``."""
         if self.reuse and not self.clock.matters:
             self.set_frame(frame)
             self.known.add(KnownState(self._acting(frame), unknowns, modes))
 
     def take_up(self, frame: float, unknowns: Floats, *, recalled: bool) -> None:
-        """Restore the state of ``frame`` with ``unknowns`` (n,), as if it had just been reached."""
+        """Restore the state of ``frame``, with ``unknowns`` (n,), as if it had just been reached. ``recalled``: by ``recall``."""
         self.set_frame(frame)
         self.unknowns.x.array[:] = unknowns
         if self.contact:
@@ -219,7 +219,7 @@ class AssembledBody:
                 self.stability.negative_modes()
 
     def _acting(self, frame: float) -> Floats:
-        """All numbers that determine the state at ``frame``, besides the body itself."""
+        """All values that determine the state at ``frame``, apart from the body itself."""
         amounts = [effect.amount(frame) for effect in self.effects]
         poses = [entry.pose(frame).ravel() for entry in self.contact.bones] if self.contact else []
         allowed = [self.contact.law.allowance(frame)] if self.contact else []
@@ -233,7 +233,7 @@ class AssembledBody:
             one.move_to(frame)
 
     def scalars(self) -> dict[str, float]:
-        """The smallest det F at quadrature points and vertices, V/V0, and the energies [N mm]."""
+        """The smallest det F at quadrature points and at vertices, V/V0, the energies [N mm], and the scalars of contact."""
         contact = self.contact.scalars() if self.contact else {}
         contact |= self.touching.scalars() if self.touching else {}
         moving = {} if self.kinetic_form is None else {"kinetic_energy": self.integral(self.kinetic_form)}
@@ -247,11 +247,11 @@ class AssembledBody:
         return contact | moving | gap | own
 
     def examine(self, frame: float) -> float | None:
-        """The number of directions in which the energy falls from the present state, at ``frame``; None if the tangent is not
-        symmetric. The state is kept for later frames with the same loads.
+        """The number of directions in which the energy decreases from the current state, at ``frame``; None if the tangent is not
+        symmetric. The state is stored for later frames with the same loads.
 
-        With drag or viscosity a direction counts if a departure along it would grow by more than a factor e over all frames, with
-        the bones at rest from now on, and without the viscous stress of this step.
+        With drag or viscosity, a direction counts if a perturbation along it would grow by more than a factor of e over the
+        duration of all frames, with the bones held still and without the viscous stress of the current step.
         """
         if self.recalled is not None:
             self.modes = self.recalled.negative_modes
@@ -265,7 +265,7 @@ class AssembledBody:
         return modes
 
     def modes_of_material(self) -> float:
-        """The number of negative modes of the present state that the material certainly has."""
+        """The number of negative modes of the current state that certainly belong to the material, not to the element."""
         assert self.stability is not None  # modes have been counted
         with self.clock.slow(np.array(self.unknowns.x.array)):
             return self.stability.of_material()
@@ -280,7 +280,7 @@ class AssembledBody:
         return float(self.comm.allreduce(fem.assemble_scalar(form), MPI.SUM))
 
     def positions(self, cells: Ints, points: Floats) -> Floats:
-        """The present positions (n, 3) [mm] of rest ``points`` (n, 3), each in a cell of ``cells`` (n,); on every rank."""
+        """The current positions (n, 3) [mm] of rest ``points`` (n, 3) in ``cells`` (n,); every rank gets all of them."""
         mine, result = np.flatnonzero(self.local[cells] >= 0), np.empty_like(points)
         carried = contact_points.on_skin(self.displacement, Skin(cells, points, np.zeros(len(cells))), self.local)
         for indices, moved in self.comm.allgather((mine, carried.positions(self.unknowns.x.array))):
@@ -289,7 +289,7 @@ class AssembledBody:
 
 
 def _linear_solver(system: System, body: Body, settings: BodySettings) -> LinearSolver:
-    """The linear solver that ``settings`` name, or the default for the size of the ``system``."""
+    """The linear solver named in ``settings``, or the default for the size of the ``system``."""
     # The tangent is symmetric if contact and all loads have an energy.
     symmetric = body.has_energy and all(one.stored for one in body.effects if isinstance(one, Load))
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")

@@ -1,4 +1,4 @@
-"""Boundary conditions, exact or by springs, on the facets of a region, at points of a skin or along tendons; and their forces."""
+"""Boundary conditions, exact or by springs, on the facets of a region, at points of a skin or along tendons, and their forces."""
 
 from typing import Any
 
@@ -14,25 +14,25 @@ from fem_reference.solvers.fenicsx.meshes import Displacement
 
 
 class PrescribedRegion:
-    """A ``Prescribed`` condition on a ``displacement``, over this rank's ``facets``."""
+    """A ``Prescribed`` condition on the ``displacement`` of a region; ``facets``: the facets of the region on this rank."""
 
     def __init__(self, displacement: Displacement, entry: Prescribed, facets: Ints) -> None:
         self.entry, self.unknowns, self.along = entry, displacement.unknowns, list(entry.components)
         self.nodes = fem.locate_dofs_topological(displacement.space, 2, facets)
         self.rest: Floats = displacement.space.tabulate_dof_coordinates()[self.nodes]
         self.all = displacement.dofs[self.nodes]  # the unknowns (m, 3) of the nodes
-        self.dofs: Ints = np.ravel(self.all[:, self.along])  # the prescribed unknowns, exactly or by springs
+        self.dofs: Ints = np.ravel(self.all[:, self.along])  # the unknowns that are prescribed, exactly or by springs
         self.exact = self.dofs if entry.stiffness is None else np.zeros(0, np.int64)
         self.wanted = fem.Function(displacement.space)
         self.extension = np.zeros_like(self.rest)
 
     @property
     def prescribed(self) -> Floats:
-        """The present prescribed values (n,) of the unknowns ``dofs``."""
+        """The current prescribed values (n,) of the unknowns ``dofs``."""
         return np.ravel(np.reshape(self.wanted.x.array, (-1, 3))[self.nodes][:, self.along])
 
     def springs(self, form: Form) -> Any:
-        """The weak form of springs that pull towards the prescribed displacement, 0 if it is exact."""
+        """The weak form of the springs that pull towards the prescribed displacement; 0 if the condition is exact."""
         if self.entry.stiffness is None:
             return 0
         measure = form.measure(str(self.entry.on))
@@ -42,30 +42,33 @@ class PrescribedRegion:
         return sum(stiffness * (displacement[i] - self.wanted[i]) * test[i] * measure for i in self.along)
 
     def move_to(self, frame: float) -> None:
-        """Prescribe the displacement of the path at ``frame``."""
+        """Prescribe the displacement that the path has at ``frame``."""
         ends = self.rest - self.extension
         self.wanted.x.array.reshape(-1, 3)[self.nodes] = self.entry.path(ends, frame) - self.extension
 
     def extend(self, response: Floats) -> None:
-        """Extend springs at rest by the ``response`` (n,) of the unknowns: the other end of each spring is moved back by it."""
+        """Extend the springs at rest: move their prescribed ends back by the ``response`` (n,) of the unknowns."""
         if self.entry.stiffness is not None:
             self.extension = np.where(np.isin(np.arange(3), self.along), response[self.all], 0.0)
             self.wanted.x.array.reshape(-1, 3)[self.nodes] = -self.extension
 
     def force(self, residual: Floats, now: Floats, shared: Ints) -> tuple[Floats, Floats]:
-        """The force (3,) [N] on this rank's part of the region and its moment (3,) [N mm] about the origin, from the
-        ``residual`` of the effects in the body and the unknowns ``now``. Regions that prescribe the same unknown
-        share its force equally: ``shared`` (n,) counts them.
+        """The force (3,) [N] on this rank's part of the region, and its moment (3,) [N mm] about the origin.
+
+        ``residual`` (n,): the residual of the effects in the body; ``now`` (n,): the current unknowns; ``shared`` (n,): the number
+        of regions that prescribe each unknown. These regions divide the force at the unknown equally.
         """
         places, forces = self.rest + now[self.all], np.zeros_like(self.rest)
         forces[:, self.along] = (residual[self.all] / np.maximum(shared[self.all], 1))[:, self.along]
         index_map = self.unknowns.function_space.dofmap.index_map
-        forces[self.all >= index_map.size_local * self.unknowns.function_space.dofmap.index_map_bs] = 0  # other ranks'
+        forces[self.all >= index_map.size_local * self.unknowns.function_space.dofmap.index_map_bs] = (
+            0  # of other ranks
+        )
         return forces.sum(axis=0), np.cross(places, forces).sum(axis=0)
 
 
 class PointSprings:
-    """A ``Prescribed`` condition by springs at ``points`` of this rank's cells; never exact, as points are not unknowns."""
+    """A ``Prescribed`` condition by springs at ``points`` in this rank's cells. It is never exact, as points have no unknowns."""
 
     exact: Ints = np.zeros(0, np.int64)
 
@@ -78,19 +81,19 @@ class PointSprings:
 
     @property
     def prescribed(self) -> Floats:
-        """The present targets (3 n,) [mm] of the points."""
+        """The current targets (3 n,) [mm] of the points."""
         return self.wanted.ravel()
 
     def move_to(self, frame: float) -> None:
-        """Prescribe the displacement of the path at ``frame``."""
+        """Prescribe the displacement that the path has at ``frame``."""
         self.wanted = self.ends + self.entry.path(self.ends, frame)
 
     def extend(self, response: Floats) -> None:
-        """Extend springs at rest, as ``PrescribedRegion.extend`` does."""
+        """Extend the springs at rest, as ``PrescribedRegion.extend`` does."""
         self.ends = self.wanted = self.points.rest - self.along * (self.points.positions(response) - self.points.rest)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
-        """Add spring forces to ``residual`` over this rank's unknowns, at the unknowns plus ``moves`` (n,) if given."""
+        """Add the spring forces to ``residual`` (n,) over this rank's unknowns, at the unknowns plus ``moves`` (n,) if given."""
         now = self.unknowns.x.array
         self.points.add_forces(residual, self._pulls(now if moves is None else now + moves))
 
@@ -109,8 +112,8 @@ class PointSprings:
 
 
 class Tendons(PointSprings):
-    """Straight lines from ``points`` of this rank's cells to the anchor of a ``Prescribed``, which moves along its path. Each line
-    pulls with its stiffness times its extension ``l - l0``, and not at all if it is slack.
+    """Straight lines from ``points`` in this rank's cells to the anchor of a ``Prescribed`` condition, which moves along the path
+    of the condition. A taut line pulls with its stiffness times its extension ``l - l0``; a slack line exerts no force.
     """
 
     def __init__(self, unknowns: fem.Function, entry: Prescribed, points: ContactPoints) -> None:
@@ -122,7 +125,7 @@ class Tendons(PointSprings):
         """Do nothing: no tendon is taut at rest."""
 
     def tangent(self) -> tuple[Ints, Floats, Floats]:
-        """``k n n^T + k (l - l0) / l (1 - n n^T)`` along the direction n of a taut line, 0 for a slack line."""
+        """``k n n^T + k (l - l0) / l (1 - n n^T)`` for a taut line with direction n, 0 for a slack line."""
         along, length, tension = self._lines(self.unknowns.x.array)
         straight = along[:, :, None] * along[:, None, :]
         taut = np.where(length >= self.lengths, self.stiffness[:, 0], 0.0)[:, None, None]
@@ -134,7 +137,7 @@ class Tendons(PointSprings):
         return tension[:, None] * along
 
     def _lines(self, unknowns: Floats) -> tuple[Floats, Floats, Floats]:
-        """The directions (n, 3) away from the anchor, lengths (n,) [mm] and tensions (n,) [N] of the lines."""
+        """The directions (n, 3) of the lines away from the anchor, their lengths (n,) [mm] and their tensions (n,) [N]."""
         lines = self.points.positions(unknowns) - self.wanted
         length = np.linalg.norm(lines, axis=1)
         return lines / length[:, None], length, self.stiffness[:, 0] * np.maximum(length - self.lengths, 0.0)

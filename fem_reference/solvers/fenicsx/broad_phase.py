@@ -1,5 +1,7 @@
-"""A search for material points that may be near a bone. The points of a cell form a patch, which stays out of reach until its nodes
-have moved by its clearance at the last search.
+"""A search for the material points that may be near a bone.
+
+The points in a cell form a patch. A patch cannot come within reach of the bone until its nodes have moved by the clearance that the
+last search found for the patch.
 """
 
 from collections.abc import Callable
@@ -12,8 +14,11 @@ from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 
 
 class Patches:
-    """The points of each of p cells. A point moves at most ``spread`` (p,) times as far as the k nodes of its cell: the sum of the
-    magnitudes of basis functions. If these do not reproduce its rest position, rotations add at most ``off`` (p,) [mm].
+    """The points grouped by cell, with one patch for each of the p cells.
+
+    A point moves at most ``spread`` (p,) times as far as the k nodes of its cell, where ``spread`` is the maximum over the patch of
+    the sum of the magnitudes of the basis functions. If the basis functions do not reproduce the rest positions of the points,
+    rotations add at most ``off`` (p,) [mm].
     """
 
     def __init__(self, points: ContactPoints) -> None:
@@ -29,16 +34,18 @@ class Patches:
         np.maximum.at(self.off, patch, 2 * np.linalg.norm(points.rest - rest, axis=1))
 
     def points(self, some: Ints) -> tuple[Ints, Ints]:
-        """The points (n,) of ``some`` patches, patch by patch, and the start index of each patch."""
+        """The points (n,) of the patches ``some``, patch by patch, and the index at which each patch starts among them."""
         counts = self.starts[some + 1] - self.starts[some]
         begins = np.cumsum(counts) - counts
         return self.order[np.repeat(self.starts[some] - begins, counts) + np.arange(counts.sum())], begins
 
 
 class Nearby:
-    """Finds the points within ``reach`` [mm] of a bone of a ``shape``, and perhaps some more. For each patch it stores, from the
-    last search that examined its points, their clearance ``free`` (p,) [mm] and the positions ``seen`` (p, k, 3) of its nodes in
-    the bone's frame; ``met`` (p,): True if there was such a search since the last converged state.
+    """Finds all points within ``reach`` [mm] of a bone of a given ``shape``, and possibly some that are farther away.
+
+    For each patch it stores, from the last search that examined the points of the patch, their clearance ``free`` (p,) [mm] and the
+    positions ``seen`` (p, k, 3) [mm] of the nodes in the bone's frame. ``met`` (p,) is True if such a search has taken place since
+    the last converged state.
     """
 
     def __init__(self, shape: Obstacle, reach: float, patches: Patches) -> None:
@@ -48,8 +55,10 @@ class Nearby:
         self.met = np.ones(patches.count, bool)
 
     def find(self, nodes: Floats, local: Callable[[Ints], Floats]) -> tuple[Ints, Sampled]:
-        """The points (n,) that may be within reach, and their distance to the bone. ``nodes`` (m, 3) [mm] are in the bone's frame;
-        ``local`` gives the positions of points in that frame.
+        """The points (n,) that may be within reach, and the bone's distance sampled at these points.
+
+        ``nodes`` (m, 3) [mm]: the positions of the nodes in the bone's frame; ``local``: a function that returns the positions of
+        given points in that frame.
         """
         now = nodes[self.patches.nodes]
         moved = np.sqrt(((now - self.seen) ** 2).sum(axis=2).max(axis=1, initial=0.0))
@@ -67,9 +76,11 @@ class Nearby:
     def crossing(
         self, before: Callable[[Ints], Floats], after: Callable[[Ints], Floats]
     ) -> tuple[Ints, Floats, Floats]:
-        """The points (n,) whose straight path since the last converged state may have come within reach, and the ends (n, 3) of
-        the path, which ``before`` and ``after`` give for any points. A patch that was not examined since then lies, with the paths
-        of its points, in a sphere clear of the bone.
+        """The points (n,) whose straight paths since the last converged state may have come within reach, and the starts (n, 3) and
+        the ends (n, 3) [mm] of these paths.
+
+        ``before`` and ``after`` return the starts and the ends for given points. A patch that has not been examined since the last
+        converged state lies, with the paths of its points, in a sphere clear of the bone.
         """
         points, _ = self.patches.points(np.flatnonzero(self.met))
         starts, ends = before(points), after(points)

@@ -1,34 +1,36 @@
-/* Residual and tangent of an energy per rest volume, cell by cell: the sums over quadrature points of finite elements.
+/* Residual and tangent of an energy per rest volume: sums over the quadrature points of each finite element.
 
-   The caller gives the first and second derivatives of the energy at the points; here they are combined with the element's basis.
-   Variables at a point, in this order: for each component i of the displacement its derivatives along x, y, z and, if KINDS is 4,
-   the component itself; then, if there are PRESSURES, the pressure. The given derivatives of the energy are the VARIABLES first
-   derivatives, then the upper triangle of the second derivatives, row by row.
+   The caller gives the first and second derivatives of the energy at the points; this code combines them with the basis of the
+   element. Order of the variables at a point: for each component i of the displacement, its derivatives along x, y and z and, if
+   KINDS is 4, the component itself; then the pressure, if PRESSURES is not 0. Order of the given derivatives: the first derivatives
+   (one for each of the VARIABLES), then the upper triangle of the second derivatives, row by row.
 
-   Unknowns of a cell, in this order: component by component of the displacement its NODES, then the PRESSURES.
+   Order of the unknowns of a cell: for each component of the displacement the values at the NODES, then the PRESSURES.
 
-   Sizes are compiled in: POINTS of quadrature, NODES, PRESSURES, GEOMETRY nodes of the cell's shape, KINDS.
+   The sizes are compile-time constants: POINTS (of the quadrature), NODES, PRESSURES, GEOMETRY (the nodes that define the shape of
+   the cell) and KINDS.
 */
 
 #define VARIABLES (3 * KINDS + (PRESSURES > 0))
 #define SECOND (VARIABLES * (VARIABLES + 1) / 2)
 #define UNKNOWNS (3 * NODES + PRESSURES)
-#define WIDE ((NODES + 3) / 4) /* vectors of four with a number for each node */
+#define WIDE ((NODES + 3) / 4) /* vectors of four that hold one value for each node */
 #define ROWS (POINTS * KINDS)
 
 typedef double vector __attribute__((vector_size(32), aligned(32)));
 typedef struct { /* the element at its quadrature points */
     const double *weights;   /* (POINTS) */
-    const double *shape;     /* (POINTS, GEOMETRY, 3) slopes of the functions that place the cell */
-    const double *slopes;    /* (POINTS, NODES, 3) slopes of the basis of a component of the displacement */
-    const double *values;    /* (POINTS, NODES) its values */
+    const double *shape;     /* (POINTS, GEOMETRY, 3) gradients of the basis of the geometry */
+    const double *slopes;    /* (POINTS, NODES, 3) gradients of the basis of a displacement component */
+    const double *values;    /* (POINTS, NODES) values of the same basis */
     const double *pressures; /* (POINTS, PRESSURES or 1) values of the basis of the pressure */
 } Element;
 
 /* The index of the second derivative with respect to variables v and w, v <= w. */
 static inline int second(int v, int w) { return VARIABLES + v * VARIABLES - v * (v - 1) / 2 + w - v; }
 
-/* The ROWS that give the variables of a component from its nodes, and the weights (POINTS) times rest volume, of a cell at x. */
+/* For a cell at x: the ROWS that map the nodal values of a component to its variables, and the weights (POINTS) times rest volume.
+*/
 static void basis(const Element *e, const double *x, vector (*rows)[WIDE], double *weights)
 {
     for (int q = 0; q < POINTS; q++) {
@@ -79,7 +81,7 @@ static void cell_residual(const Element *e, const double *given, int stride, vec
     }
 }
 
-/* The part of the tangent between components i <= j of the displacement. */
+/* The block of the tangent that couples the displacement components i <= j. */
 static void between(int i, int j, const double *given, int stride, vector (*rows)[WIDE], const double *weights,
                     double (*tangent)[UNKNOWNS])
 {
@@ -110,7 +112,7 @@ static void between(int i, int j, const double *given, int stride, vector (*rows
     }
 }
 
-/* The part of the tangent that involves the pressure, in a ``unit`` of its own. */
+/* The blocks of the tangent that involve the pressure, whose unknowns are scaled by ``unit``. */
 static void with_pressure(const Element *e, const double *given, int stride, vector (*rows)[WIDE], const double *weights,
                           double unit, double (*tangent)[UNKNOWNS])
 {
@@ -137,10 +139,12 @@ static void with_pressure(const Element *e, const double *given, int stride, vec
     }
 }
 
-/* Adds the contributions of ``count`` cells at x (count, GEOMETRY, 3): from the derivatives ``given`` (count, POINTS, stride), to
-   ``residual`` at their ``unknowns`` (count, UNKNOWNS), and, unless it is null, to ``tangent`` at the places (count, UNKNOWNS,
-   UNKNOWNS) of their entries, with pressures in a ``unit``. Unless ``moves`` is null, the tangent times these
-   changes of the displacement is added to the residual as well. */
+/* Adds the contributions of ``count`` cells at x (count, GEOMETRY, 3), computed from the derivatives ``given`` (count, POINTS,
+   stride).
+
+   The forces are added to ``residual`` at the ``unknowns`` (count, UNKNOWNS) of the cells. Unless ``tangent`` is null, the tangent
+   of the cells is added to it at the indices ``places`` (count, UNKNOWNS, UNKNOWNS), with the pressures scaled by ``unit``. Unless
+   ``moves`` is null, the tangent times these changes of the displacement is also added to ``residual``. */
 void add_cells(const Element *e, long count, const double *x, const double *given, int stride, const int *unknowns,
                const int *places, double *residual, double *tangent, double unit, const double *moves)
 {
@@ -170,8 +174,8 @@ void add_cells(const Element *e, long count, const double *x, const double *give
     }
 }
 
-/* Adds to the tangent the contributions of ``count`` points of ``cells``, where ``slope`` (count, 3, 3) is the derivative of the
-   traction with respect to the position, and ``basis`` (count, NODES) has the values of the functions there. */
+/* Adds to the tangent the contributions of ``count`` points in ``cells`` (count). ``slope`` (count, 3, 3): the derivatives of the
+   tractions with respect to the positions of the points; ``basis`` (count, NODES): the values of the basis functions there. */
 void add_points(long count, const int *cells, const double *basis, const double *slope, const int *places, double *tangent)
 {
     for (long point = 0; point < count; point++) {
@@ -187,8 +191,9 @@ void add_points(long count, const int *cells, const double *basis, const double 
     }
 }
 
-/* Finds the places of the cells' entries in a sparse matrix: ``starts`` of its rows in the sorted ``columns``. An entry of a row or
-   column that is ``fixed`` gets the place ``nowhere``. */
+/* Finds the indices ``places`` of the cells' entries in a sparse matrix whose rows begin at ``starts`` in the sorted ``columns``.
+An
+   entry in a ``fixed`` row or column gets the index ``nowhere``. */
 void find_places(long count, const int *unknowns, const int *starts, const int *columns, const char *fixed, int nowhere,
                  int *places)
 {

@@ -1,4 +1,4 @@
-"""Residual and tangent of the energy, summed over cells by compiled loops (``cells.c``), in chunks that fit into a cache."""
+"""Residual and tangent of the energy, summed over cells by compiled loops (``cells.c``), in chunks that fit into the cache."""
 
 import ctypes
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ class _Element(ctypes.Structure):
 
 
 class Structure(NamedTuple):
-    """The sparsity of a matrix over this rank's unknowns, ghosts included: the ``starts`` of rows in the sorted ``columns``."""
+    """The sparsity of a matrix over this rank's unknowns, ghosts included: the ``starts`` of the rows in the sorted ``columns``."""
 
     starts: Places
     columns: Places
@@ -34,8 +34,10 @@ class Structure(NamedTuple):
 
 @dataclass
 class Tangent:
-    """The ``entries`` (e + 1,) of a matrix, the ``places`` (m, u, u) of each cell's entries among them, and the ``unit`` of unknown
-    pressures. The last entry collects everything that belongs to prescribed unknowns.
+    """A tangent matrix during assembly.
+
+    ``entries`` (e + 1,): the entries of the matrix; the last one collects all contributions of prescribed unknowns.
+    ``places`` (m, u, u): the index in ``entries`` of each entry of each cell. ``unit``: the scale of the pressure unknowns.
     """
 
     entries: Floats
@@ -44,8 +46,8 @@ class Tangent:
 
 
 class CellSums:
-    """Sums over the cells that this rank owns. ``unknowns`` (m, u) of each cell: the displacement component by component, then the
-    pressures; ``structure``: the sparsity of the tangent.
+    """Sums over the cells that this rank owns. ``unknowns`` (m, u): the unknowns of each cell, first the displacement component by
+    component, then the pressures.
     """
 
     def __init__(self, form: Form) -> None:
@@ -59,7 +61,7 @@ class CellSums:
         self.unknowns: Places = np.concatenate([part.dofmap.list for part in parts], axis=1)[: self.count]
         self.nodes = space.sub(0).sub(0).dofmap.list.shape[1]
         tables = _tables(element, msh, form.rule)
-        self.kept = [np.ascontiguousarray(tables[name]) for name in _FIELDS]  # C only holds their addresses
+        self.kept = [np.ascontiguousarray(tables[name]) for name in _FIELDS]  # stays alive, as C only has the addresses
         self.element = _Element(*(table.ctypes.data for table in self.kept))
         self.corners = np.ascontiguousarray(msh.geometry.x[msh.geometry.dofmap[: self.count]])
         sizes = {"POINTS": len(form.rule[1]), "NODES": self.nodes, "PRESSURES": self.unknowns.shape[1] - 3 * self.nodes}
@@ -68,7 +70,7 @@ class CellSums:
         self.projection = self._projection() if is_stabilised(element) else None
 
     def structure(self) -> Structure:
-        """The sparsity of the entries of cells, extended by the full diagonal."""
+        """The sparsity of the cells' entries, extended by the full diagonal."""
         starts = np.arange(0, self.unknowns.size + 1, self.unknowns.shape[1])
         entries = np.ones(self.unknowns.size, bool), self.unknowns.ravel(), starts
         has = csr_array(entries, shape=(self.count, self.size))
@@ -77,7 +79,7 @@ class CellSums:
         return Structure(found.indptr.astype(np.int32), found.indices.astype(np.int32))
 
     def places(self, structure: Structure, fixed: NDArray[np.bool_]) -> Places:
-        """The indices (m, u, u) of each cell's entries in ``structure``; one past the last for those of ``fixed`` (n,) unknowns."""
+        """The index in ``structure`` of each entry of each cell (m, u, u); one past the last for entries of ``fixed`` unknowns."""
         found = np.empty((*self.unknowns.shape, self.unknowns.shape[1]), np.int32)
         arrays: tuple[NDArray[Any], ...] = self.unknowns, structure.starts, structure.columns, fixed.view(np.int8)
         size = ctypes.c_int(len(structure.columns))
@@ -87,9 +89,11 @@ class CellSums:
     def add(
         self, residual: Floats, into: Tangent | None = None, moves: Floats | None = None, *, pointwise: bool = False
     ) -> None:
-        """Add the forces of the cells to ``residual`` (n,) over this rank's unknowns, ghosts included. If a tangent is given, add
-        the tangent of the cells ``into`` it, and to the residual its first-order change by ``moves`` (n,) of the displacement, if
-        any. ``pointwise``: the pressure follows the volume at every point and is not an unknown.
+        """Add the forces of the cells to ``residual`` (n,) over this rank's unknowns, ghosts included.
+
+        If a tangent ``into`` is given, the tangent of the cells is added to it. If a change ``moves`` (n,) of the displacement is
+        also given, the first-order change of the forces that it causes is added to ``residual``. With ``pointwise``, the pressure
+        is not an unknown but follows from the volume at every point.
         """
         given = self.form.derivatives.first if into is None else self.form.derivatives.second
         for some in self._chunks():
@@ -116,16 +120,16 @@ class CellSums:
                 np.subtract.at(into.entries, own, into.unit**2 * self.projection)
 
     def add_points(self, into: Tangent, cells: Ints, basis: Floats, slope: Floats) -> None:
-        """Add the tangent of tractions at points of ``cells`` (n,) with the values ``basis`` (n, k) of their functions; ``slope``
-        (n, 3, 3) is the derivative of the tractions with respect to the positions of the points.
+        """Add the tangent of tractions at points in ``cells`` (n,). ``basis`` (n, k): the values of the basis functions of the
+        cells at the points; ``slope`` (n, 3, 3): the derivative of each traction with respect to the position of its point.
         """
         given = cells.astype(np.int32), np.ascontiguousarray(basis), np.ascontiguousarray(slope)
         arrays: tuple[NDArray[Any], ...] = *given, into.places, into.entries
         self.code.add_points(ctypes.c_long(len(cells)), *map(_address, arrays))
 
     def softness(self) -> Floats:
-        """The mass matrix (m, p, p) [mm3/MPa] of the pressures of each cell, weighted with ``1 / (2 mu) + 1 / K``: K is the bulk
-        modulus, and mu the shear stiffness, the mean diagonal of the energy's second derivatives.
+        """The mass matrix (m, p, p) [mm3/MPa] of the pressures of each cell, weighted with ``1 / (2 mu) + 1 / K``. K is the bulk
+        modulus; the shear stiffness mu is the mean of the diagonal second derivatives of the energy.
         """
         rows, basis = self._diagonal(), self._pressures()
         stiff = [rows[i * self.form.kinds + k] for i in range(3) for k in range(3)]
@@ -136,14 +140,14 @@ class CellSums:
         return found
 
     def stabilising_energy(self) -> float:
-        """The energy [N mm] that stabilises the pressure of this rank's cells; 0 for elements without stabilisation."""
+        """The energy [N mm] that stabilises the pressure in this rank's cells; 0 for elements without stabilisation."""
         if self.projection is None:
             return 0.0
         values = self.function.x.array[self.unknowns[:, 3 * self.nodes :]]
         return -float(np.einsum("mc,mcd,md->", values, self.projection, values)) / 2
 
     def _projection(self) -> Floats:
-        """The second derivative (m, p, p) [mm3/MPa] of minus the energy described at ``body.is_stabilised``, at rest."""
+        """Minus the second derivative (m, p, p) [mm3/MPa], at rest, of the energy described at ``body.is_stabilised``."""
         rows, basis = self._diagonal(), self._pressures()
         shear = [rows[i * self.form.kinds + k] for i in range(3) for k in range(3) if i != k]
         found = np.empty((self.count, basis.shape[1], basis.shape[1]))
@@ -161,11 +165,11 @@ class CellSums:
         return [count + v * count - v * (v - 1) // 2 for v in range(count)]
 
     def _pressures(self) -> Floats:
-        """The basis of the pressure at the points (q, p)."""
+        """The values (q, p) of the basis of the pressure at the quadrature points."""
         return self.kept[4].reshape(-1, self.unknowns.shape[1] - 3 * self.nodes)
 
     def _parts(self) -> Iterator[tuple[slice, Floats, Floats]]:
-        """For each chunk its cells, the energy's first and second derivatives at points (m, q, v) and volumes (m, q) [mm3]."""
+        """For each chunk: the cells, the first and second derivatives (m, q, v) of the energy, and the volumes (m, q) [mm3]."""
         for some in self._chunks():
             cells = np.arange(some.start, some.stop, dtype=np.int32)
             slopes = np.einsum("mgi,qgr->mqir", self.corners[some], self.kept[1])
@@ -180,8 +184,11 @@ class CellSums:
 
 
 def _without_pressure(values: Floats, others: int) -> Floats:
-    """The derivatives ``values`` (..., v), first and upper triangle of the second, once the pressure follows the volume: its
-    stiffness, K cof F x cof F, replaces the terms that couple it with the ``others`` (the number of other variables).
+    """Eliminate the pressure from the derivatives ``values`` (..., v): the first, then the upper triangle of the second
+    derivatives.
+
+    The pressure then follows the volume at each point: the volumetric stiffness K cof F x cof F replaces the coupling terms.
+    ``others``: the number of variables other than the pressure.
     """
     values, (rows, columns) = values.copy(), np.triu_indices(others + 1)
     second, last = values[..., others + 1 :], columns == others
@@ -198,7 +205,7 @@ def _address(array: NDArray[Any]) -> ctypes.c_void_p:
 
 
 def _tables(element: str, msh: Any, rule: tuple[Floats, Floats]) -> dict[str, Floats]:
-    """The tables that ``cells.c`` needs of an element at the points of a ``rule``."""
+    """The tables of an ``element`` for ``cells.c``, evaluated at the points of a quadrature ``rule`` (points and weights)."""
     kind, degree, pressure = ELEMENTS[element]
     points, weights = rule
     displaced = lagrange(kind, degree).tabulate(1, points)[..., 0]

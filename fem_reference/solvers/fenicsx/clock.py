@@ -1,4 +1,4 @@
-"""The time of load steps, for effects that depend on velocities, and the velocities of bodies with inertia."""
+"""The duration of load steps, for effects that depend on velocities, and the velocities of bodies with inertia."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,15 +15,15 @@ _INSTANT = 1e-7
 
 
 class Clock:
-    """Sets the time ``step`` of a form; does nothing for a form without one.
+    """Sets the time ``step`` of a form; does nothing if the form has none.
 
-    With inertia a body rests up to its first requested frame: it is ``resting`` until its initial acceleration is known.
+    With inertia a body is at rest up to its first requested frame; ``resting`` is True until the initial acceleration is known.
     """
 
     def __init__(self, body: Body, step: TimeStep | None) -> None:
         self.step, self.interval, self.at, self.first = step, body.interval, body.frames[0], body.first
         self.whole = body.frames[-1] - body.frames[0]
-        # An effect with momentum, such as inertia, has the formulas of its time integration.
+        # An effect with momentum, such as inertia, contains the formulas for its time integration.
         self.momentum: Any = next((one for one in body.effects if "momentum" in one.needs), None)
         size = 0 if step is None or self.momentum is None else len(step.before.x.array)
         self.velocity, self.acceleration = np.zeros(size), np.zeros(size)
@@ -35,7 +35,7 @@ class Clock:
         return self.step is not None
 
     def start(self, frame: float, unknowns: Floats) -> None:
-        """Start a load step from the last settled frame, with its ``unknowns``, to ``frame``."""
+        """Start a load step to ``frame`` from the last settled frame, which has these ``unknowns``."""
         if self.step is not None:
             self._set(unknowns, self._seconds(frame - self.at))
 
@@ -48,16 +48,16 @@ class Clock:
             self.step.velocity.x.array[:] = self.velocity
 
     def begins(self) -> bool:
-        """True if a body with inertia first moves in the next load step; its acceleration must be found first."""
+        """True if a body with inertia begins to move in the next load step; its initial acceleration must be found first."""
         return self.resting and self.at >= self.first
 
     def instant(self, unknowns: Floats) -> None:
-        """Start a load step from rest at ``unknowns``, too short for any motion."""
+        """Start a load step from rest at ``unknowns`` that is too short for any motion."""
         self._set(unknowns, self._seconds(_INSTANT * self.whole))
 
     def begin(self, unknowns: Floats) -> None:
-        """End the step that ``instant`` started, with ``unknowns``: velocities are 0, and accelerations are now known."""
-        assert self.step is not None  # there is momentum
+        """End the step that ``instant`` started, with ``unknowns``. The velocities are 0, and the accelerations are now known."""
+        assert self.step is not None  # an effect has momentum
         moved = unknowns - self.step.before.x.array
         self.acceleration, self.resting = self.momentum.begun(moved, 1 / float(self.step.rate.value)), False
 
@@ -78,19 +78,19 @@ class Clock:
             start[:] = values
 
     def arrays(self) -> dict[str, Floats]:
-        """The arrays that restore the last load step, besides the unknowns at its end."""
+        """The arrays, apart from the unknowns at its end, from which the last load step can be restored."""
         if self.step is None:
             return {}
         found = {"before": np.array(self.step.before.x.array)}
         return found | ({"velocity": self.velocity, "acceleration": self.acceleration} if self.momentum else {})
 
     def facts(self) -> dict[str, Any]:
-        """The numbers that restore the clock, besides the ``arrays``."""
+        """The scalar values that, with the ``arrays``, restore the clock."""
         rate = None if self.step is None else float(self.step.rate.value)
         return {"at": self.at, "resting": self.resting, "rate": rate}
 
     def take_up(self, arrays: dict[str, Floats], facts: dict[str, Any]) -> None:
-        """Restore the clock that gave ``arrays`` and ``facts``."""
+        """Restore the state in which the clock returned ``arrays`` and ``facts``."""
         self.at, self.resting = facts["at"], facts["resting"]
         if self.step is None:
             return

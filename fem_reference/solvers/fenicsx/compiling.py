@@ -1,4 +1,4 @@
-"""Compilation of forms for this machine: one process at a time compiles, after it has removed incomplete files of a form."""
+"""Compilation of forms for this machine. One process compiles at a time, after removing the files of incomplete compilations."""
 
 import signal
 from collections.abc import Callable, Sequence
@@ -23,8 +23,8 @@ from ufl.domain import extract_domains
 
 from fem_reference.foundations import native
 
-# All instructions of this machine, and sums in any order. Never -ffast-math itself: it assumes that no number is NaN, which here
-# marks a state without a value, and it makes the process round denormal numbers to zero.
+# Use all instructions of this machine, and let the compiler reorder sums. Not -ffast-math itself: it assumes that no value is NaN,
+# which here marks a state without a value, and it makes the process round denormal numbers to zero.
 FLAGS = ["-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros"]
 FLAGS += ["-fassociative-math", "-freciprocal-math"]
 # FFCx stores compiled forms under a hash of their content and these options, which include the kind of machine.
@@ -32,7 +32,7 @@ OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's compilation, by one process at a time. A lock per form would need its signature, which costs more than the search."""
+    """Let one process at a time run FFCx's compilation. A lock per form would need its signature, which is slow."""
 
     @wraps(compiled)
     def waiting(objects: list[Any], *given: Any, **options: Any) -> R:
@@ -45,8 +45,9 @@ def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
 
 
 def _complete[R](search: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's search for a compiled form, once for each, after its incomplete files are removed. As this process holds the lock, no
-    other process is writing these files: an interrupted or killed process left them, and FFCx would wait for their completion.
+    """Wrap FFCx's search for a compiled form: search once for each form, after removing its incomplete files. As this process holds
+    the lock, no other process is writing these files; they are left from an interrupted or killed process, and FFCx would wait for
+    them to be completed.
     """
     loaded: dict[str, R] = {}
 
@@ -69,7 +70,7 @@ def _complete[R](search: Callable[..., R]) -> Callable[..., R]:
 generator.compile_forms = _alone(generator.compile_forms)
 generator.compile_expressions = _alone(generator.compile_expressions)
 generator.get_cached_module = _complete(generator.get_cached_module)
-# An element makes its cell, with all cells of its boundary, whenever it is asked: a fifth of the time to set up a small body.
+# UFL creates an element's cell, with all cells of its boundary, at each access: a fifth of the set-up time of a small body.
 ufl.cell.Cell = cache(ufl.cell.Cell)
 
 
@@ -79,7 +80,7 @@ def form(expression: Any) -> Any:
 
 
 class _Code(NamedTuple):
-    """A compiled expression, its ``module``, and the indices, in its formula's lists, of functions and constants that it reads."""
+    """A compiled expression, its ``module``, and the indices of the functions and constants it reads in the formula's lists."""
 
     expression: Any
     module: Any
@@ -87,7 +88,7 @@ class _Code(NamedTuple):
     constants: tuple[int, ...]
 
 
-class BoundExpression(fem.Expression):  # type: ignore[misc]  # its type parameter is that of its values
+class BoundExpression(fem.Expression):  # type: ignore[misc]  # generic in the type of its values
     """A compiled expression that reads the functions and constants of one body."""
 
     def __init__(self, code: _Code, functions: Sequence[Any], constants: Sequence[Any]) -> None:
@@ -98,7 +99,7 @@ class BoundExpression(fem.Expression):  # type: ignore[misc]  # its type paramet
         self._cpp_object = cpp.fem.create_expression_float64(address, *read, [], None)
 
 
-_codes: dict[tuple[str, str, tuple[int, ...]], tuple[_Code, ...]] = {}  # by the hash of the formulas
+_codes: dict[tuple[str, str, tuple[int, ...]], tuple[_Code, ...]] = {}  # by signature, points and numbers of components
 
 
 def expression(value: Any, points: Any) -> Any:
@@ -107,14 +108,15 @@ def expression(value: Any, points: Any) -> Any:
 
 
 def expressions(values: list[Any], points: Any, first: int) -> tuple[Any, Any]:
-    """Compiled expressions at reference ``points`` (q, 3): one for the ``first`` few of the scalars ``values``, and one for all."""
+    """Two compiled expressions at reference ``points`` (q, 3): of the ``first`` scalars in ``values``, and of all of them."""
     whole, part = _bound(ufl.as_vector(values), points, (first,))
     return part, whole
 
 
 def _bound(value: Any, points: Any, firsts: tuple[int, ...]) -> list[BoundExpression]:
-    """A ``value`` compiled at reference ``points`` (q, 3): all of it, and its first components for each number in ``firsts``. A
-    formula is differentiated and looked up only once: another body has other functions and constants in the same order.
+    """Compiled expressions of a ``value`` at reference ``points`` (q, 3): one of all components, then one of the first n components
+    for each n in ``firsts``. A formula is differentiated and looked up only once: for another body only the functions and constants
+    differ, in the same order.
     """
     functions, constants = extract_coefficients(value), extract_constants(value)
     labels = sorted(extract_type(value, Label), key=Label.count)
@@ -138,7 +140,7 @@ def _code(value: Any, points: Any, functions: list[Any], constants: list[Any]) -
 
 
 class _WithoutVariables(MultiFunction):  # type: ignore[misc]  # UFL has no types
-    """Replaces variables of differentiation by values: their numbers differ between processes, and so would forms' signatures."""
+    """Replaces UFL variables by their values. Their labels, and with them the signatures of forms, differ between processes."""
 
     expr = MultiFunction.reuse_if_untouched
 
@@ -147,7 +149,7 @@ class _WithoutVariables(MultiFunction):  # type: ignore[misc]  # UFL has no type
 
 
 def library(source: Path, sizes: dict[str, int]) -> CDLL:
-    """The functions of a C file, compiled with ``sizes`` and kept with FFCx's compiled forms."""
+    """The functions of a C file, compiled with ``sizes`` as macros and stored with FFCx's compiled forms."""
     flags = [*FLAGS, *(f"-D{name}={value}" for name, value in sizes.items())]
     return native.library(source, flags, Path(jit.get_options()["cache_dir"]))
 
@@ -159,5 +161,5 @@ def prepare() -> None:
 
 
 def _stop(_number: int, _frame: FrameType | None) -> None:
-    # FFCx cleans up after an Exception, which SystemExit is not.
+    # FFCx cleans up after an Exception; SystemExit is not one.
     raise RuntimeError("asked to stop")

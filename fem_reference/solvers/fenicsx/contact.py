@@ -1,6 +1,6 @@
-"""Contact of bones with material points of a body: its pressure, which depends on the gap, and its tangent.
+"""Contact of bones with material points of a body: the pressure as a function of the gap, and its tangent.
 
-Distances are computed only for points that may be near a bone (``broad_phase``), and only points under pressure are summed. A
+Distances are computed only for points that may be near a bone (``broad_phase``), and only points under pressure enter the sums. A
 load step that begins and ends without contact pressure is solved without contact.
 """
 
@@ -23,18 +23,18 @@ from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.friction import Friction, Grip
 from fem_reference.solvers.fenicsx.spent import Spent
 
-# A point deeper in a bone than this fraction of half the bone's thickness counts as having passed through.
+# A point deeper in a bone than this fraction of half the bone's thickness counts as having gone through.
 _GIVEN_WAY = 0.75
-# The straight path of a point that slides round a rim cuts the rim to at most this depth, as a fraction of half the thickness, and
-# at most to the depth of the smoothing.
+# The straight path of a point that slides round a rim cuts through the rim. The depth of this cut may be at most this fraction of
+# half the thickness, and at most the smoothing.
 _RIM = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class Pressed:
-    """Contact with one bone: the ``gap`` (m,) [mm], negative inside, of the points ``near`` (m,), which include all points within
-    the smoothing. For the ``pressed`` points (k,) among them: the ``pressure`` (k,) [MPa per unit rest area], the ``traction``
-    (k, 3) and its derivative ``slope`` (k, 3, 3) [MPa/mm], both with friction, and the friction's ``grip``.
+    """Contact with one bone. ``near`` (m,): points near the bone, including all within the smoothing; ``gap`` (m,) [mm]: their
+    gaps, negative inside. ``pressed`` (k,): the points under pressure; ``pressure`` (k,) [MPa per unit rest area]; the
+    ``traction`` (k, 3) [MPa] and its derivative ``slope`` (k, 3, 3) [MPa/mm], both with friction; ``grip``: the friction.
     """
 
     near: Ints
@@ -46,7 +46,7 @@ class Pressed:
     grip: Grip | None = None
 
 
-# Tractions (n, 3) [MPa] at points (n,), which may repeat.
+# The indices (n,) of points, which may repeat, and the tractions (n, 3) [MPa] at these points.
 Tractions = tuple[Ints, Floats]
 State = tuple[list[Pressed], float, Floats]
 
@@ -78,20 +78,20 @@ class ContactForces:
         self.settle()
 
     def look(self) -> None:
-        """Search for points within reach of each bone, including points that overlap it, or that it supports, at rest."""
+        """Set up the search for points within reach of each bone, including points that overlap it or that it supports at rest."""
         patches, support = Patches(self.points), self.law.in_situ or 0.0
         reach = [self.law.smoothing + max(support, float(-one.min(initial=0.0))) for one in self.overlaps]
         self.nearby = [Nearby(bone.shape, far, patches) for bone, far in zip(self.bones, reach, strict=True)]
 
     def update(self, frame: float) -> None:
-        """Find the pressures at the present unknowns, with the bones at their poses of ``frame``."""
+        """Compute the pressures at the current unknowns, with the bones in their poses at ``frame``."""
         with self.spent.on("contact"):
             self.frame, carried = frame, self.points.carried
             self.moved = self.unknowns.x.array[carried.dofs]
             self.now = [self._pressed(i, carried.rest + self.moved) for i in range(len(self.bones))]
 
     def _pressed(self, i: int, nodes: Floats) -> Pressed:
-        """The contact with one bone, for ``nodes`` (m, 3) [mm] that carry the points; overlap at rest is subtracted."""
+        """The contact with bone ``i``, for ``nodes`` (m, 3) [mm] that carry the points. Overlap at rest is subtracted."""
         pose = self.bones[i].pose(self.frame)
         turn, local = pose[:3, :3], partial(self._local, i, self.frame, self.moved)
         near, (gap, gradient, bend) = self.nearby[i].find((nodes - pose[:3, 3]) @ turn, local)
@@ -110,7 +110,7 @@ class ContactForces:
         return replace(found, traction=own[0], slope=own[1], grip=grip)
 
     def _held(self, i: int) -> Floats:
-        """The positions (n, 3) [mm], in the frame of bone ``i``, of the points that it presses; NaN for all others."""
+        """The positions (n, 3) [mm], in the frame of bone ``i``, of the points that the bone presses; NaN for all other points."""
         found, some = np.full(self.points.rest.shape, np.nan), self.now[i].pressed
         found[some] = self._local(i, self.frame, self.moved, some)
         return found
@@ -128,20 +128,20 @@ class ContactForces:
         return np.asarray((self._places(moved, some) - pose[:3, 3]) @ pose[:3, :3])
 
     def _places(self, moved: Floats, some: Ints) -> Floats:
-        """The positions (k, 3) [mm] of ``some`` points (k,); nodes are displaced by ``moved`` (m, 3)."""
+        """The positions (k, 3) [mm] of ``some`` points (k,), with the nodes displaced by ``moved`` (m, 3)."""
         return np.asarray(self.points.rest[some] + self.points.carried.shares[some] @ moved)
 
     def presses(self) -> bool:
-        """True if a bone presses a point, on any rank."""
+        """True if a bone presses on a point, on any rank."""
         return bool(self.comm.allreduce(any(len(one.pressed) for one in self.now), MPI.LOR))
 
     def tractions(self) -> Tractions:
-        """The tractions of all bones."""
+        """The pressed points of all bones, and the tractions on them."""
         which = np.concatenate([np.zeros(0, np.int64), *(one.pressed for one in self.now)])
         return which, np.concatenate([np.zeros((0, 3)), *(one.traction for one in self.now)])
 
     def predicted(self, frame: float, moves: Floats) -> Tractions:
-        """The ``tractions`` once the unknowns change by ``moves`` and the bones are at ``frame``, linearised in both."""
+        """The ``tractions`` after changes ``moves`` of the unknowns and a motion of the bones to ``frame``, linearised in both."""
         which, found = self.tractions()
         ahead, carried = [np.zeros((0, 3))], self.points.carried
         for entry, one in zip(self.bones, self.now, strict=True):
@@ -152,21 +152,21 @@ class ContactForces:
         return which, found + np.concatenate(ahead)
 
     def add_residual(self, residual: Floats, tractions: Tractions | None) -> None:
-        """Add the weak form of ``tractions``, by default the present ones, to ``residual`` over this rank's unknowns."""
+        """Add the weak form of ``tractions``, by default the current ones, to ``residual`` over this rank's unknowns."""
         which, found = self.tractions() if tractions is None else tractions
         if len(which):
             self.points.add_forces(residual, -self.points.areas[which, None] * found, which)
 
     def tangent(self) -> Iterator[tuple[Ints, Floats, Floats]]:
-        """The derivative of the residual for each bone: cells (p,), basis (p, k), traction slopes (p, 3, 3) of pressed points."""
+        """For each bone, the derivative of the residual at pressed points: cells (p,), basis (p, k) and slopes (p, 3, 3)."""
         for one in self.now:
             if len(touched := one.pressed):
                 areas = self.points.areas[touched, None, None]
                 yield self.points.cells[touched], self.points.basis[touched], -areas * one.slope
 
     def forces(self) -> dict[str, tuple[Floats, Floats]]:
-        """The force (3,) [N] of each bone, by name, on this rank's points, and its moment (3,) [N mm] about the origin; also, under
-        the names of bone and part, on the points of each part that the law names.
+        """The force (3,) [N] of each bone on this rank's points and its moment (3,) [N mm] about the origin, by the bone's name. If
+        the law names parts, there is one entry for each part and bone, with the names of both.
         """
         found = {}
         for entry, one in zip(self.bones, self.now, strict=True):
@@ -178,9 +178,10 @@ class ContactForces:
         return found
 
     def scalars(self) -> dict[str, float]:
-        """The maxima ``contact_depth`` [mm], ``contact_pressure`` [MPa] and ``PART.contact_pressure`` of parts; the rest area in
-        contact, ``contact_area`` [mm2], and its ``contact_points``; ``contact_points_near``, those whose distance was computed;
-        ``overlap_at_rest`` [mm] of the deepest point, removed or not; and ``friction_work`` [N mm], dissipated since the start.
+        """The maxima ``contact_depth`` [mm], ``contact_pressure`` [MPa] and ``PART.contact_pressure`` of each part; the rest area
+        ``contact_area`` [mm2] and the number ``contact_points`` of points in contact; ``contact_points_near``, the number of points
+        whose distance was computed; ``overlap_at_rest`` [mm], of the deepest point, whether the overlap is removed or not; and
+        ``friction_work`` [N mm], dissipated since the start.
         """
         comm, touched, depth, pressure = self.comm, np.zeros(len(self.points.areas), bool), 0.0, 0.0
         for one in self.now:
@@ -203,7 +204,7 @@ class ContactForces:
         return found | {name: comm.allreduce(value, MPI.SUM) for name, value in sums.items()}
 
     def deepest(self) -> str:
-        """The depth of the deepest point, its bone and its position, in words."""
+        """The depth of the deepest point, the name of the bone and the position, as text."""
         mine = []
         for entry, one in zip(self.bones, self.now, strict=True):
             if len(one.near):
@@ -212,7 +213,7 @@ class ContactForces:
         return self._worst(mine) or "nowhere"
 
     def settle(self) -> None:
-        """Take the present state as the start of the next step. Friction begins once no overlap at rest is left."""
+        """Accept the current state as the start of the next step. Friction begins when no overlap at rest remains."""
         for friction, one in zip(self.friction, self.now, strict=False):
             if one.grip is not None:
                 friction.settle(one.grip)
@@ -227,20 +228,20 @@ class ContactForces:
 
     @property
     def state(self) -> State:
-        """The contact with each bone, its frame, and the displacement of the nodes that carry points."""
+        """The contact with each bone, the frame, and the displacement of the nodes that carry points."""
         return self.now, self.frame, self.moved
 
     def restoring(self) -> Callable[[], None]:
-        """A function that restores the present state, once the unknowns have been restored."""
+        """The function that restores the current contact after the unknowns have been restored."""
         return partial(self.go_back, self.state)
 
     def go_back(self, state: State | None = None) -> None:
-        """Restore an earlier ``state``, by default the settled one, once the unknowns have been restored."""
+        """Restore an earlier ``state``, by default the settled one, after the unknowns have been restored."""
         self.now, self.frame, self.moved = state or self.settled
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """The trouble *diverged* if a point went through a bone since the last settled state, is pressed near the middle of a bone,
-        or met a bone with friction from too far away.
+        """The trouble *diverged* if a point has gone through a bone since the last settled state, is pressed near the middle of a
+        bone, or has come into contact with friction from too far away.
         """
         with self.spent.on("contact"):
             through = [one for i in range(len(self.bones)) if (one := self._through(i))]
@@ -248,7 +249,7 @@ class ContactForces:
         return Trouble("diverged", why) if why else None
 
     def _yielded(self) -> list[tuple[float, str]]:
-        """The bones with a pressed point so deep that it could leave on any side, with its depth relative to half the thickness."""
+        """The bones with a pressed point so deep that it could leave on any side: its depth over half the thickness, a message."""
         mine, allowed = list[tuple[float, str]](), self.law.allowance(self.frame)
         for entry, one, before in zip(self.bones, self.now, self.overlaps, strict=True):
             depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))
@@ -258,7 +259,7 @@ class ContactForces:
         return mine
 
     def _from_afar(self) -> list[tuple[float, str]]:
-        """The bones with friction that a point met from so far away that its distance, and so its slip, are unknown."""
+        """The bones with friction that points met from so far away that their slip is unknown: the number of points, a message."""
         mine = list[tuple[float, str]]()
         for i, friction in enumerate(self.friction):
             pressed = self.now[i].pressed
@@ -269,20 +270,20 @@ class ContactForces:
         return mine
 
     def _worst(self, mine: list[tuple[float, str]]) -> str | None:
-        """The sentence with the largest number among those of all ranks; None if there is none."""
+        """The message with the largest number on any rank; None if there is no message."""
         found: list[tuple[float, str]] = [one for rank in self.comm.allgather(mine) for one in rank]
         return max(found)[1] if found else None
 
     def _through(self, i: int) -> tuple[float, str] | None:
-        """The point that went farthest through a bone since the last settled state; None without such a point. Its straight path in
-        the frame of the bone is deeper inside than both ends and leaves on the other side.
+        """The excess depth [mm] of the point that went farthest through bone ``i`` since the last settled state, and a message;
+        None without such a point. Its straight path in the bone's frame is deeper inside than both ends and leaves on the far side.
         """
         _, settled_at, settled = self.settled
         there, here = partial(self._local, i, settled_at, settled), partial(self._local, i, self.frame, self.moved)
         met, starts, ends = self.nearby[i].crossing(there, here)
         before, now = (self.bones[i].shape.sample(places) for places in (starts, ends))
         displacements = ends - starts
-        # Far away the gap is unknown: outward is then opposite to the displacement at the start, and along it at the end.
+        # Far away the gap is unknown; outward is then taken as opposite to the displacement at the start, and along it at the end.
         outward = [
             np.where(one.gradient.any(axis=1)[:, None], one.gradient, sign * displacements)
             for one, sign in ((before, -1), (now, 1))

@@ -1,4 +1,4 @@
-"""Contact points and points of springs: their places in the cells, and the nodes that carry them."""
+"""Contact points and points of springs: their positions in the cells, and the nodes that carry them."""
 
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -17,9 +17,9 @@ from fem_reference.solvers.fenicsx.meshes import Displacement, geometry
 
 @dataclass(frozen=True, eq=False)
 class ContactPoints:
-    """n points of this rank's cells: their rest positions ``rest`` (n, 3) [mm], rest ``areas`` (n,) [mm2], the ``cells`` (n,) that
-    carry them; for the nodes of these cells the values ``basis`` (n, k) of their functions at the points, the rest positions
-    ``nodes`` (n, k, 3) [mm] and the unknowns ``dofs`` (n, k, 3).
+    """n points in this rank's cells. ``rest`` (n, 3) [mm]: rest positions; ``areas`` (n,) [mm2]: rest areas; ``cells`` (n,): the
+    cells that carry the points. For the k nodes of each cell: the values ``basis`` (n, k) of their basis functions at the point,
+    the rest positions ``nodes`` (n, k, 3) [mm] and the unknowns ``dofs`` (n, k, 3).
     """
 
     rest: Floats
@@ -30,12 +30,12 @@ class ContactPoints:
     dofs: Ints
 
     def positions(self, unknowns: Floats) -> Floats:
-        """The present positions (n, 3) [mm] of the points."""
+        """The current positions (n, 3) [mm] of the points."""
         carried = self.carried
         return np.asarray(self.rest + carried.shares @ unknowns[carried.dofs])
 
     def add_forces(self, residual: Floats, forces: Floats, some: Ints | None = None) -> None:
-        """Add the weak form of ``forces`` (n, 3) [N] at (``some`` of) the points to ``residual`` over this rank's unknowns."""
+        """Add the weak form of ``forces`` (n, 3) [N] on all points, or on ``some``, to ``residual`` over this rank's unknowns."""
         shares = self.carried.shares if some is None else self.carried.shares[some]
         residual[self.carried.dofs] += shares.T @ forces  # ``dofs`` names each unknown once
 
@@ -51,8 +51,8 @@ class ContactPoints:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """The m nodes that carry n points, each once: their unknowns ``dofs`` (m, 3), rest positions ``rest`` (m, 3) [mm], the nodes
-    ``which`` (n, k) of each point, and the ``shares`` (n, m) of each point in them.
+    """The m nodes that carry n points, each listed once. ``dofs`` (m, 3): the unknowns of the nodes; ``rest`` (m, 3) [mm]: their
+    rest positions; ``which`` (n, k): the nodes of each point; ``shares`` (n, m): the weight of each node in each point.
     """
 
     dofs: Ints
@@ -62,7 +62,7 @@ class Carried:
 
 
 def on_facets(displacement: Displacement, mesh: Cells, facets: Ints, degree: int) -> ContactPoints:
-    """The quadrature points of a rule of ``degree`` on the ``facets`` that belong to this rank's own cells."""
+    """The quadrature points of a rule of ``degree`` on the ``facets`` of cells that this rank owns."""
     kind, msh = basix.CellType[mesh.kind], displacement.space.mesh
     sides = _sides(msh.topology, facets)
     side = basix.CellType.triangle if mesh.kind == "tetrahedron" else basix.CellType.quadrilateral
@@ -84,7 +84,7 @@ def on_facets(displacement: Displacement, mesh: Cells, facets: Ints, degree: int
 
 
 def on_skin(displacement: Displacement, skin: Skin, local: Ints) -> ContactPoints:
-    """The points of a ``skin`` in this rank's own cells; ``local`` (m,): this rank's number of each cell of the body, or -1."""
+    """The points of a ``skin`` in cells that this rank owns; ``local`` (m,): this rank's index of each cell of the body, or -1."""
     mine, msh = np.flatnonzero(local[skin.cells] >= 0), displacement.space.mesh
     cells, points = local[skin.cells[mine]], skin.points[mine]
     within = barycentric(points, msh.geometry.x[msh.geometry.dofmap[cells]])[:, 1:]
@@ -92,7 +92,7 @@ def on_skin(displacement: Displacement, skin: Skin, local: Ints) -> ContactPoint
 
 
 def _points(displacement: Displacement, cells: Ints, within: Floats, rest: Floats, areas: Floats) -> ContactPoints:
-    """Points at reference coordinates ``within`` (n, 3) of ``cells`` (n,)."""
+    """Contact points at reference coordinates ``within`` (n, 3) of ``cells`` (n,)."""
     space = displacement.space
     element: Any = space.element.basix_element
     basis = element.tabulate(0, within)[0, :, :, 0]
@@ -102,7 +102,7 @@ def _points(displacement: Displacement, cells: Ints, within: Floats, rest: Float
 
 
 def _sides(topology: Any, facets: Ints) -> Ints:
-    """The cell of each facet of this rank's own cells, and the facet's number in the cell, (f, 2)."""
+    """For each facet of a cell that this rank owns, the cell and the number of the facet in the cell (f, 2)."""
     cells, back = topology.connectivity(2, 3), topology.connectivity(3, 2)
     own = topology.index_map(3).size_local
     beside = [(int(cells.links(facet)[0]), facet) for facet in facets]

@@ -16,8 +16,8 @@ from fem_reference.solvers.fenicsx.meshes import Displacement, geometry
 
 @dataclass(frozen=True)
 class Extreme:
-    """The minimum or maximum ``value`` over cells, the ``cell`` of the body and the rest position ``at`` [mm]. ``where`` names the
-    kind of point; it is empty for means over cells.
+    """The minimum or maximum ``value`` over cells, the index ``cell`` of the cell in the body, and the rest position ``at`` [mm].
+    ``where`` names the kind of point; it is empty for means over cells.
     """
 
     value: float
@@ -31,7 +31,9 @@ class Extreme:
 
 
 def least(comm: MPI.Comm, values: Floats, cells: Ints, at: Floats, where: str = "", sign: float = 1.0) -> Extreme:
-    """The minimum of ``sign * values`` (n, ...) over ``cells`` (n,) of all ranks, ``at`` positions (n, ..., 3); NaN is smallest."""
+    """The entry of ``values`` (n, ...) on all ranks that has the smallest ``sign * values``; NaN counts as smallest. ``cells`` (n,)
+    and ``at`` (n, ..., 3) [mm]: the cells and positions of the values.
+    """
     mine = Extreme(sign * np.inf, where, -1, (0.0, 0.0, 0.0))
     if len(cells):  # a rank may have none
         i = np.unravel_index(np.argmin(np.where(np.isnan(values), -np.inf, sign * values)), values.shape)
@@ -48,7 +50,7 @@ class Determinants:
         """``cells``: the index in the body of each cell of this rank; ``rule``: quadrature points (q, 3) of a ``kind`` of cell."""
         self.mesh, self.cells, self.unknowns = displacement.space.mesh, cells, displacement.unknowns.x
         vertices = reference_nodes(kind, 1)
-        # Compiled, as each iteration needs it, and by all ranks together, even ranks without cells.
+        # Compiled, because every iteration needs it, and by all ranks together, even ranks without cells.
         self.inside = compiling.expression(determinant, rule)
         self.at_vertices = displacement.tabulated(vertices, len(cells))
         at_vertices, slopes = geometry(self.mesh, vertices, slice(len(cells)))
@@ -61,17 +63,17 @@ class Determinants:
         return min(found, key=lambda one: (not np.isnan(one.value), one.value))
 
     def trouble(self, _: Floats, /) -> Trouble | None:
-        """The trouble *inverted* if det F is not positive somewhere."""
+        """The trouble *inverted* if det F is not positive at some point."""
         smallest = self.smallest()
         return None if smallest.value > 0 else Trouble("inverted", f"det F fell to {smallest}")
 
     def smallest_of(self, values: Floats, where: str = "quadrature point") -> Extreme:
-        """The smallest of ``values`` (p,) at the points of one kind in this rank's cells, over all ranks; NaN is smallest."""
+        """The smallest of ``values`` (p,) at one kind of point in this rank's cells, over all ranks; NaN counts as smallest."""
         places = self.rest[where]
         return least(self.mesh.comm, values.reshape(places.shape[:2]), self.cells, places, where)
 
     def values_now(self) -> Floats:
-        """Det F at the quadrature points of this rank's cells (p,), where the energies are evaluated."""
+        """Det F (p,) at the quadrature points of this rank's cells, at which the energies are evaluated."""
         return self._at("quadrature point").ravel()
 
     def everywhere(self, good: NDArray[np.bool_]) -> bool:
@@ -79,7 +81,7 @@ class Determinants:
         return bool(self.mesh.comm.allreduce(bool(good.all()), MPI.LAND))
 
     def _at(self, where: str) -> Floats:
-        """Det F for each cell of this rank and each point of one kind."""
+        """Det F in each cell of this rank at each point of one kind."""
         if len(self.cells) == 0:
             return np.zeros(self.rest[where].shape[:2])
         if where == "vertex":

@@ -1,4 +1,4 @@
-"""The import of DOLFINx: the PyPI wheel if it is installed, else any other build (conda, Debian)."""
+"""The import of DOLFINx: the PyPI wheel if it is installed, otherwise any other build (conda, Debian)."""
 
 import contextlib
 import sys
@@ -9,7 +9,7 @@ __all__ = ["PETSc", "dolfinx"]
 
 
 # FFCx imports numba if it is installed, for kernels that are not used here; this takes a quarter of a process's start-up time. So
-# numba is hidden during the import, unless it is already loaded.
+# numba is hidden during the import unless it is already loaded.
 _HIDDEN = "numba" not in sys.modules
 if _HIDDEN:
     sys.modules["numba"] = None  # type: ignore[assignment]
@@ -19,7 +19,7 @@ try:
     import dolfinx
     from petsc4py import PETSc
 
-    # If numba is loaded, this import makes the wheel's libraries global, and h5py would use the wheel's HDF5, not its own.
+    # If numba is loaded, this import makes the wheel's libraries global, and h5py would use the wheel's HDF5 instead of its own.
     if _HIDDEN:
         import dolfinx.fem.petsc
 finally:

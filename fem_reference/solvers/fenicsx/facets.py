@@ -1,4 +1,4 @@
-"""Facets of a body's surface as it deforms: polynomials between their nodes, points on facets, and nearest places on these."""
+"""Facets of a deforming surface: polynomials in the positions of their nodes, points on facets, and nearest points on facets."""
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -11,21 +11,22 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Cells
 from fem_reference.solvers.fenicsx.meshes import Displacement, lagrange
 
-_NINE = np.asarray(lagrange("quadrilateral", 2).points)  # these places determine a function of every element
-_ITERATIONS, _ROUGH = 12, 2  # of Newton's method for the nearest place, and for places far beyond the edges
-_LONGEST, _SMALL = 0.5, 1e-14  # the longest step, and one small enough to stop, in reference coordinates
-# The least sine of a line on a facet in a step, and the distance [mm] up to which it meets a place.
+_NINE = np.asarray(lagrange("quadrilateral", 2).points)  # nine points that determine a function of every element
+_ITERATIONS, _ROUGH = 12, 2  # of Newton's method for the nearest point, and for points far beyond the edges
+_LONGEST, _SMALL = 0.5, 1e-14  # the longest step, and the step at which to stop, in reference coordinates
+# The smallest sine of the angle between a line and a facet in a step, and the distance [mm] within which a line meets a point.
 _FLAT, _OFF = 0.01, 1e-9
-# A point is aside from its nearest place by at most this share of the size of the facet; coordinates far beyond the edges.
+# The largest offset of a point from the normal at its nearest point, as a fraction of the size of the facet; and reference
+# coordinates far beyond the edges.
 _ASIDE, _NOWHERE = 1e-6, 9.0
-_BALL = 1.25  # the radius of a ball around a facet, over the distance of its farthest node from the mean of its nodes
+_BALL = 1.25  # the radius of a ball around a facet, over the largest distance of a node from the mean of the nodes
 
 
 @dataclass(frozen=True, eq=False)
 class FacetPlaces:
-    """Places on n facets: the reference coordinates ``at`` (n, 2), the values ``basis`` (n, k) of the functions of the nodes and
-    their ``slopes`` (n, 2, k), the position ``point`` (n, 3) [mm], the ``tangents`` (n, 2, 3), the outward unit ``normal`` (n, 3),
-    and the second derivatives of the position along the normal, ``bend`` (n, 2, 2) [mm].
+    """Points on n facets. ``at`` (n, 2): reference coordinates; ``basis`` (n, k) and ``slopes`` (n, 2, k): the values and
+    derivatives of the nodes' basis functions; ``point`` (n, 3) [mm]: positions; ``tangents`` (n, 2, 3) [mm]: derivatives of the
+    positions; ``normal`` (n, 3): outward unit normals; ``bend`` (n, 2, 2) [mm]: second derivatives along the normals.
     """
 
     at: Floats
@@ -47,8 +48,9 @@ class FacetPlaces:
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """The m facets of a part of the surface, with k nodes each: their unknowns ``dofs`` (m, k, 3), rest positions ``rest``
-    (m, k, 3) [mm], the sign ``outward`` (m,) of the cross product of their tangents, and the ``element`` of their functions.
+    """The m facets of a part of the surface, with k nodes each. ``dofs`` (m, k, 3): the unknowns of the nodes; ``rest`` (m, k, 3)
+    [mm]: their rest positions; ``outward`` (m,): the sign that turns the cross product of the tangents outward; ``element``: the
+    element of the basis functions.
     """
 
     dofs: Ints
@@ -60,21 +62,21 @@ class Facets:
         return replace(self, dofs=self.dofs[some], rest=self.rest[some], outward=self.outward[some])
 
     def nodes(self, unknowns: Floats) -> Floats:
-        """The present positions (m, k, 3) [mm] of the nodes."""
+        """The current positions (m, k, 3) [mm] of the nodes."""
         return np.asarray(self.rest + unknowns[self.dofs])
 
     def rule(self, degree: int) -> tuple[Floats, Floats]:
-        """Points (q, 2) and weights (q,) of a quadrature of ``degree`` on the reference facet."""
+        """The points (q, 2) and weights (q,) of a quadrature rule of ``degree`` on the reference facet."""
         points, weights = basix.make_quadrature(self.element.cell_type, degree)
         return np.asarray(points), np.asarray(weights)
 
     @cached_property
     def coefficients(self) -> Floats:
-        """The coefficients (9, 6, k) of the ``_powers`` in the k functions and their derivatives: whole numbers."""
+        """The coefficients (9, 6, k), all integers, of the ``_powers`` in the k basis functions and their derivatives."""
         return np.rint(np.tensordot(np.linalg.inv(_powers(_NINE)), self.element.tabulate(2, _NINE)[..., 0], (1, 1)))
 
     def places(self, nodes: Floats, which: Ints, at: Floats) -> FacetPlaces:
-        """The places ``at`` (n, 2) on the facets ``which`` (n,), whose ``nodes`` (m, k, 3) [mm] are given."""
+        """The points ``at`` (n, 2) on the facets ``which`` (n,). ``nodes`` (m, k, 3) [mm]: the positions of all nodes."""
         tables = np.tensordot(_powers(at), self.coefficients, 1)
         point, u, v, uu, uv, vv = np.moveaxis(tables @ nodes[which], 1, 0)
         across = np.cross(u, v) * self.outward[which, None]
@@ -83,9 +85,11 @@ class Facets:
         return FacetPlaces(at, tables[:, 0], tables[:, 1:3], point, np.stack([u, v], axis=1), normal, bend)
 
     def nearest(self, nodes: Floats, which: Ints, points: Floats) -> FacetPlaces:
-        """The places on the facets ``which`` (n,), continued beyond their edges, that are nearest to ``points`` (n, 3) [mm], by
-        Newton's method from the middles of the facets; only rough where they are far beyond the edges. Where the method does not
-        converge, ``at`` is far beyond the edges: the point would seem near to a facet from which it is far.
+        """The points on the facets ``which`` (n,) that are nearest to ``points`` (n, 3) [mm], by Newton's method from the centres
+        of the facets.
+
+        Facets are continued beyond their edges; nearest points far beyond the edges are only approximate. Where the method does not
+        converge, ``at`` is set far beyond the edges, so that the point does not seem to be near a facet far from it.
         """
         at, going = self._middles(which)
         for i in range(_ITERATIONS):
@@ -106,8 +110,9 @@ class Facets:
         return replace(found, at=np.where(lost[:, None], _NOWHERE, at))
 
     def along(self, nodes: Floats, which: Ints, points: Floats, normals: Floats) -> tuple[FacetPlaces, Floats]:
-        """The places where lines through ``points`` (n, 3) [mm] along ``normals`` (n, 3) meet the facets ``which`` (n,), continued
-        beyond their edges, by Newton's method as in ``nearest``; and the distances (n,) [mm] along the lines, NaN where they miss.
+        """The points where lines through ``points`` (n, 3) [mm] along ``normals`` (n, 3) meet the facets ``which`` (n,), and the
+        distances (n,) [mm] along the lines, NaN where they miss. Facets are continued beyond their edges, and Newton's method is
+        used as in ``nearest``.
         """
         at, going = self._middles(which)
         for i in range(_ITERATIONS):
@@ -125,17 +130,17 @@ class Facets:
         return found, np.where(off < _OFF, gap, np.nan)
 
     def _middles(self, which: Ints) -> tuple[Floats, Ints]:
-        """The coordinates (n, 2) of the middles of facets ``which`` (n,), and the numbers (n,) of these."""
+        """The reference coordinates (n, 2) of the centres of the facets ``which`` (n,), and the indices 0 to n - 1."""
         return np.tile(self.element.points.mean(axis=0), (len(which), 1)), np.arange(len(which))
 
     def _moved(self, at: Floats, going: Ints, step: Floats, iteration: int) -> Ints:
-        """Move the places ``going`` (k,) of ``at`` (n, 2) by a ``step`` (k, 2), shortened if long; return those that go on."""
+        """Move the entries ``going`` (k,) of ``at`` (n, 2) by a ``step`` (k, 2), shortened if long; return the unfinished ones."""
         longest = np.abs(step).max(axis=1)
         at[going] += step * (_LONGEST / np.maximum(longest, _LONGEST))[:, None]
         return going[(longest > _SMALL) & ((iteration < _ROUGH) | (self.beyond(at[going]) < _LONGEST))]
 
     def beyond(self, at: Floats) -> Floats:
-        """The distance (n,) of reference coordinates ``at`` (n, 2) from the reference facet, 0 inside it."""
+        """The distance (n,) of the reference coordinates ``at`` (n, 2) from the reference facet; 0 inside the facet."""
         return self.leaving(at)[0]
 
     def leaving(self, at: Floats) -> tuple[Floats, Floats]:
@@ -147,19 +152,21 @@ class Facets:
 
     @staticmethod
     def balls(nodes: Floats) -> tuple[Floats, Floats]:
-        """The middles (m, 3) and radii (m,) [mm] of balls around facets with ``nodes`` (m, k, 3)."""
+        """The centres (m, 3) and radii (m,) [mm] of balls around facets with ``nodes`` (m, k, 3)."""
         middles = nodes.mean(axis=1)
         return middles, _BALL * np.linalg.norm(nodes - middles[:, None], axis=2).max(axis=1)
 
 
 def _powers(at: Floats) -> Floats:
-    """The products (n, 9) of powers up to the second of reference coordinates ``at`` (n, 2); every element's functions are sums."""
+    """The products (n, 9) of powers 0 to 2 of both reference coordinates ``at`` (n, 2). The basis functions of every element are
+    linear combinations of them.
+    """
     powers = np.stack([1 + 0 * at, at, at * at], axis=2)
     return np.asarray((powers[:, 0, :, None] * powers[:, 1, None]).reshape(len(at), 9))
 
 
 def facets_of(displacement: Displacement, mesh: Cells, facets: Ints) -> Facets:
-    """The ``facets`` of a ``mesh`` on one rank, in the order of their numbers there."""
+    """The ``facets`` of a ``mesh`` on one rank, in the given order."""
     space, msh = displacement.space, displacement.space.mesh
     cells, back = msh.topology.connectivity(2, 3), msh.topology.connectivity(3, 2)
     beside = np.array([cells.links(facet)[0] for facet in facets], np.int64)

@@ -1,4 +1,4 @@
-"""The weak form of a body, summed from its effects; symbols stand for parameters, so that one compiled form serves many bodies."""
+"""The weak form of a body, summed from its effects. Parameters are symbols, so that one compiled form serves many bodies."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -35,8 +35,8 @@ _FUNCTIONS = Functions(ufl.exp, ufl.ln, ufl.sqrt, ufl.cos, ufl.sin, _above)
 
 
 class Derivatives(NamedTuple):
-    """Two compiled expressions at the quadrature points: all first derivatives of an energy, and these with the upper triangle of
-    the second derivatives, in the order of ``cells.c``.
+    """Two compiled expressions at the quadrature points, in the order of ``cells.c``: ``first``, the first derivatives of an
+    energy; ``second``, these followed by the upper triangle of the second derivatives.
     """
 
     first: Any
@@ -44,18 +44,20 @@ class Derivatives(NamedTuple):
 
 
 class Form:
-    """The weak form of a body. ``derivatives``: derivatives of the energy, with ``kinds`` variables per component of the
-    displacement; an effect whose amount is zero from one frame to the next is left out there. ``loads``: the residual of loads on
-    the surface, 0 without loads; ``stretched``: the same for effects that store energy on the surface.
+    """The weak form of a body.
 
-    ``energy``: the stored energy as an integral; ``determinant``: det F; ``fibre_stretch``: as the energies use it (None without
-    fibres). The caller sets the amounts of effects (``set_amounts``) and the time ``step`` (None if nothing depends on it).
-    ``kinetic``: the kinetic energy (0 without inertia); ``rule``: points (q, 3) and weights (q,) of the quadrature, of ``degree``;
-    ``regions``: this rank's facets by name; ``rest``: the stress at rest of a body in situ.
+    ``derivatives``: the derivatives of the energy, with ``kinds`` variables for each component of the displacement. An effect whose
+    amount is zero from one frame to the next is left out between these frames. ``loads``: the residual of loads on the surface;
+    ``stretched``: the residual of effects that store energy on the surface; both are 0 without such effects.
+
+    ``energy``: the stored energy as an integral; ``kinetic``: the kinetic energy (0 without inertia); ``determinant``: det F;
+    ``fibre_stretch``: as the energies use it (None without fibres); ``rule``: points (q, 3) and weights (q,) of the quadrature of
+    ``degree``; ``regions``: this rank's facets by name; ``rest``: the stress at rest of a body in situ. The caller sets the amounts
+    of effects (``set_amounts``) and the time ``step`` (None if nothing depends on it).
     """
 
     def __init__(self, msh: mesh.Mesh, body: Body, unknowns: fem.Function, settings: BodySettings, cells: Ints) -> None:
-        """``cells``: the number in the body of each cell of this rank."""
+        """``cells``: the index in the body of each cell of this rank."""
         self.mesh, self.unknowns, self.element = msh, unknowns, settings.element
         self.regions = dict(zip(body.mesh.facets, meshes.local_facets(msh, body.mesh.facets.values()), strict=True))
         self.rule = rule(settings.element, settings.quadrature_degree)
@@ -94,7 +96,7 @@ class Form:
         self.stretched: Any = ufl.derivative(stretched, unknowns) if stretched else 0
 
     def set_amounts(self, frame: float) -> None:
-        """Set the amounts of effects at a frame, and select the derivatives without the effects that are left out there."""
+        """Set the amounts of effects at a frame, and select the derivatives without the effects that are left out at this frame."""
         for effect, amount in zip(self.effects, self.amounts, strict=True):
             amount.value = effect.amount(frame)
         self.derivatives = self._made[self._quiet(frame)]
@@ -105,7 +107,7 @@ class Form:
 
     @contextmanager
     def isotropic(self) -> Iterator[None]:
-        """A context with the derivatives of the isotropic body that gives a body in situ its stress at rest."""
+        """A context in which ``derivatives`` are those of the isotropic body that gives a body in situ its stress at rest."""
         assert self._isotropic is not None  # a body in situ has it
         own, self.derivatives = self.derivatives, self._isotropic
         try:
@@ -118,7 +120,7 @@ class Form:
         return Derivatives(*compiling.expressions(first + second, self.rule[0], len(first)))
 
     def _stretched(self, acting: list[tuple[Effect, Any]], body: Body, state: State) -> Any:
-        """The energy that effects store on the surface, 0 without them; shares in regions are linear between the vertices."""
+        """The energy that effects store on the surface, 0 without any. Shares in regions vary linearly between vertices."""
         stored = [effect for effect, _ in acting if isinstance(effect, Load) and effect.stored]
         shares: dict[str, Any] = {}
         for name in regions_named(stored):
@@ -141,7 +143,7 @@ class Form:
         return self.ds(list(self.regions).index(region))
 
     def _fibre(self, body: Body, cells: Ints) -> list[Any] | None:
-        """The fibre direction at the quadrature points, if an effect needs it."""
+        """The fibre direction at the quadrature points; None unless an effect needs it."""
         if body.fibre is None or not any("fibre" in effect.needs for effect in body.effects):
             return None
         directions = body.fibre(np.repeat(cells, len(self.rule[0])), self._places(self.rule[0], cells))
@@ -149,7 +151,7 @@ class Form:
         return [function[i] for i in range(3)]
 
     def _regions(self, body: Body, cells: Ints) -> dict[str, Any]:
-        """The shares of the quadrature points in the regions in which effects act."""
+        """The shares, at the quadrature points, of the regions in which effects act."""
         if not regions_named(body.effects):
             return {}
         points, corners = self.rule[0], reference_nodes(body.mesh.kind, 1)
@@ -162,7 +164,7 @@ class Form:
         return geometry(self.mesh, points, slice(len(cells)))[0].reshape(-1, 3)
 
     def _known(self, body: Body, values: Floats) -> fem.Function:
-        """A function with ``values`` (n, ...) at the quadrature points."""
+        """A function that takes the ``values`` (n, ...) at the quadrature points."""
         points, weights = self.rule
         shape = values.shape[1:]
         element = basix.ufl.quadrature_element(body.mesh.kind, value_shape=shape, points=points, weights=weights)
@@ -174,7 +176,9 @@ class Form:
 
 @dataclass(frozen=True, eq=False)
 class TimeStep:
-    """A load step's inverse duration ``rate`` [1/s] and the unknowns ``before``; with inertia those ``predicted``, ``velocity``."""
+    """A load step: the inverse duration ``rate`` [1/s], the unknowns ``before``, and with inertia the unknowns ``predicted`` and
+    the ``velocity``.
+    """
 
     rate: fem.Constant
     before: fem.Function
@@ -193,7 +197,7 @@ def _step(effects: list[Effect], space: fem.FunctionSpace) -> TimeStep | None:
 def _state(
     unknowns: fem.Function, fibre: list[Any] | None, step: TimeStep | None
 ) -> tuple[State, tuple[Any, Any, Any]]:
-    """The state at a point, and its variables of differentiation: F, the displacement, and the pressure if there is one."""
+    """The state at a point, and the variables of differentiation: F, the displacement, and the pressure (None if there is none)."""
     displacement, *others = (ufl.variable(part) for part in ufl.split(unknowns))
     F = ufl.variable(ufl.Identity(3) + ufl.grad(ufl.split(unknowns)[0]))
     timed: dict[str, Any] = {"F_before": _rows(F)}
@@ -214,7 +218,7 @@ def _state(
 
 
 def _components(unknowns: fem.Function) -> list[Any]:
-    """The displacement (3,) of ``unknowns``."""
+    """The components (3,) of the displacement in ``unknowns``."""
     return [ufl.split(unknowns)[0][i] for i in range(3)]
 
 
@@ -223,7 +227,7 @@ def _rows(F: Any) -> list[list[Any]]:
 
 
 def _silent(effect: Effect, frames: tuple[float, ...]) -> list[tuple[float, float]]:
-    """The spans, from one of the ``frames`` to the next, in which the energy of an ``effect`` is zero."""
+    """The intervals, from one of the ``frames`` to the next, in which the energy of an ``effect`` is zero."""
     if not isinstance(effect, Energy) or not isinstance(effect, Ramped):
         return []
     knots = [knot.frame for knot in effect.ramp]
@@ -235,7 +239,7 @@ def _silent(effect: Effect, frames: tuple[float, ...]) -> list[tuple[float, floa
 
 
 def _differentiated(energy: Any, by: tuple[Any, Any, Any], kinds: int) -> tuple[list[Any], list[Any]]:
-    """The first derivatives of ``energy`` with respect to all variables (``kinds`` per component of the displacement, then the
+    """The first derivatives of ``energy`` with respect to all variables (``kinds`` for each component of the displacement, then the
     pressure), and the upper triangle of the second derivatives, in the order of ``cells.c``.
     """
     F, displacement, pressure = by

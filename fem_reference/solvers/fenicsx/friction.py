@@ -1,4 +1,4 @@
-"""Friction of bones: points stick to places on a bone, and drag these places along when they slide."""
+"""Friction on bones: a point sticks to an anchor on the bone, and drags the anchor along when it slides."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ from fem_reference.geometry.rigid_bodies import Sampled
 from fem_reference.problems.contact import ContactLaw
 from fem_reference.problems.friction import returned, since_entry
 
-# The positions (m, 3) [mm] of points (m,) in the frame of the bone, and their gaps (m,) [mm], in the last settled state.
+# Returns the positions (m, 3) [mm] of points (m,) in the bone's frame, and their gaps (m,) [mm], in the last settled state.
 Before = Callable[[Ints], tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True, eq=False)
 class Grip:
-    """Friction of n points ``which`` (n,): the ``traction`` (n, 3) [MPa] and its ``slope`` (n, 3, 3), the places ``stuck`` (n, 3)
-    that hold the points, all in the frame of the bone, and the work ``lost`` (n,) [N/mm] per rest area since the settled state.
+    """Friction of n points ``which`` (n,), in the frame of the bone: the ``traction`` (n, 3) [MPa], its derivative ``slope``
+    (n, 3, 3) [MPa/mm] and the anchors ``stuck`` (n, 3) [mm]. ``lost`` (n,) [N/mm]: the work per rest area since the settled state.
     """
 
     which: Ints
@@ -28,19 +28,20 @@ class Grip:
 
 
 class Friction:
-    """The friction of one bone by a ``law`` that has a coefficient. ``stuck`` (n, 3): the places [mm] in the frame of the bone that
-    hold the points, NaN for points that are not pressed.
+    """The friction of one bone by a ``law`` that has a coefficient of friction. ``stuck`` (n, 3) [mm]: the anchors of the points in
+    the frame of the bone; NaN for points that are not pressed.
     """
 
     def __init__(self, law: ContactLaw, stuck: Floats) -> None:
         self.law, self.stuck = law, stuck
 
     def grip(self, which: Ints, here: Floats, gaps: Sampled, before: Before) -> Grip:
-        """The friction of pressed points ``which`` (n,) at places ``here`` (n, 3) [mm], where gaps and their derivatives are known.
+        """The friction of the pressed points ``which`` (n,) at positions ``here`` (n, 3) [mm] in the frame of the bone. ``gaps``:
+        the gaps there, with derivatives; ``before``: a function, see ``Before``.
 
-        With the unit normal n and the elastic slip e, the vector from the place that holds the point, without its part along n, the
-        traction is ``-min(k |e|, friction p) e/|e|``. A point that has come into contact since the settled state slips from where
-        its straight path comes within the smoothing.
+        The elastic slip e is the vector from the anchor to the point, without its component along the unit normal n. The traction
+        is ``-min(k |e|, friction p) e/|e|``. A point that has come into contact since the settled state slips from the position at
+        which its straight path comes within the smoothing.
         """
         slip, change = self._slip(which, here, gaps, before)
         length = np.linalg.norm(gaps.gradient, axis=1)
@@ -62,7 +63,7 @@ class Friction:
         return Grip(which, -found.stiffness[:, None] * elastic, slope, here - kept[:, None] * elastic, lost)
 
     def _slip(self, which: Ints, here: Floats, gaps: Sampled, before: Before) -> tuple[Floats, Floats]:
-        """Displacement (n, 3) [mm] of points from the places that hold them, and its derivative (n, 3, 3) in their positions."""
+        """The displacement (n, 3) [mm] of points from their anchors, and its derivative (n, 3, 3) by the points' positions."""
         slip, change = here - self.stuck[which], np.tile(np.eye(3), (len(which), 1, 1))
         new = np.flatnonzero(np.isnan(slip).any(axis=1))
         if len(new):
@@ -74,7 +75,7 @@ class Friction:
         return slip, change
 
     def settle(self, grip: Grip) -> None:
-        """Hold only the points of ``grip``, at its places ``stuck``, until the next call."""
+        """Hold only the points of ``grip``, at its anchors ``stuck``, until the next call."""
         self.stuck[:] = np.nan
         self.stuck[grip.which] = grip.stuck
 

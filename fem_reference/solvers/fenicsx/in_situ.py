@@ -1,8 +1,8 @@
 """Equilibrium at rest of a body in situ: the stress, the extended springs and the bones' pressure that balance its tension.
 
 All three follow from a small displacement, the ``response`` of an isotropic body to the forces of the effects at rest. This body is
-supported by its attachments and springs, and by bones that act as one-sided springs. The problem is linear once the touched points
-are known; Newton's method finds these as an active set.
+supported by its attachments and springs, and by bones that act as one-sided springs. The problem is linear once it is known which
+points touch a bone; Newton's method finds these points as an active set.
 """
 
 import numpy as np
@@ -13,13 +13,13 @@ from fem_reference.solvers.fenicsx.forms import Form
 from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 from fem_reference.solvers.fenicsx.system import System
 
-_MOST = 40  # linear problems
+_MOST = 40  # the maximum number of linear problems
 _TOLERANCE = 1e-12  # the relative tolerance of a linear problem
 _SHARE = 1e-2  # the remaining residual, as a fraction of the tolerance of Newton's method
 
 
 def balance(form: Form, system: System, linear: LinearSolver, residual: float) -> None:
-    """Find the stress at rest of a ``form`` in situ, up to a small fraction of the tolerance ``residual`` of Newton's method.
+    """Find the stress at rest of a ``form`` in situ, to a small fraction of the tolerance ``residual`` of Newton's method. Raises
     ArithmeticError if no stress at rest is found.
     """
     if form.rest is None:
@@ -50,8 +50,8 @@ def balance(form: Form, system: System, linear: LinearSolver, residual: float) -
 
 
 class Supports:
-    """The bones of ``contact`` at rest, as one-sided springs of the law's stiffness at the points that touch them, whatever the
-    smoothing. Other points within the smoothing do not count at rest.
+    """The bones of ``contact`` at rest, as one-sided springs of the law's stiffness at the points that touch them. Points that are
+    within the smoothing without touching a bone do not count at rest.
     """
 
     def __init__(self, contact: ContactForces) -> None:
@@ -68,7 +68,7 @@ class Supports:
         self.press(np.zeros(len(contact.unknowns.x.array)))
 
     def press(self, response: Floats) -> None:
-        """Make the bones press at rest as their springs do at a ``response`` (n,) of the unknowns."""
+        """Give the bones the pressure at rest that their springs have at a ``response`` (n,) of the unknowns."""
         for overlap, near, gap, depth in zip(
             self.contact.overlaps, self.near, self.gaps, self._depths(response), strict=True
         ):
@@ -77,7 +77,7 @@ class Supports:
         self.contact.settle()
 
     def springs(self, response: Floats) -> list[Pressed]:
-        """Contact with the tangent of the springs that stay in touch at a ``response`` (n,) of the unknowns."""
+        """The contact with the tangent of those springs that remain in contact at a ``response`` (n,) of the unknowns."""
         found = []
         for near, gap, normal, depth in zip(self.near, self.gaps, self.normals, self._depths(response), strict=True):
             some = np.flatnonzero(depth >= 0)
@@ -86,7 +86,7 @@ class Supports:
         return found
 
     def _depths(self, response: Floats) -> list[Floats]:
-        """The depths of the points in each bone at a ``response`` (n,) of the unknowns; below 0 outside the bone."""
+        """The depth of each point in each bone at a ``response`` (n,) of the unknowns; negative outside the bone."""
         moved = self.contact.points.positions(response) - self.contact.points.rest
         placed = zip(self.near, self.normals, self.touch, strict=True)
         return [np.where(touch, -np.einsum("ni,ni->n", moved[near], normal), -np.inf) for near, normal, touch in placed]

@@ -1,4 +1,4 @@
-"""Jobs of the solving process, and the stored states from which a run continues."""
+"""Jobs for the worker process, and the stored states from which a run continues."""
 
 import json
 from contextlib import suppress
@@ -16,8 +16,8 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 
 @dataclass(frozen=True)
 class Kept:
-    """The ``folder`` that keeps the states of a run, and the ``frames`` in it. The run can continue from the last frame, and use
-    the others when the same loads return. ``mesh``: the mesh's fingerprint.
+    """The ``folder`` with the stored states of a run, and the ``frames`` stored in it. The run can continue from the last frame,
+    and reuse the earlier ones when the same loads return. ``mesh``: the fingerprint of the mesh.
     """
 
     folder: Path
@@ -30,8 +30,8 @@ class Kept:
 
 
 def kept(cut_off: CutOff, body: Body) -> Kept:
-    """The states to continue from; all other files that an earlier process left in the folder are removed. There are none if
-    contact depends on earlier states (``Body.remembers``), which are not kept.
+    """The states from which a run continues; all other files in the folder are removed. There are none if contact depends on
+    earlier states (``Body.remembers``), as these are not stored.
     """
     whole = Kept(cut_off.folder.resolve(), fingerprint(body.mesh.points, body.mesh.cells))
     frames = tuple(number for number in cut_off.numbers if not body.remembers and _is_of(whole, number))
@@ -51,10 +51,12 @@ def _is_of(whole: Kept, number: int) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """A ``body`` and how to solve it. ``samples``: by name, the cell (n,) of each point and the rest points (n, 3) whose positions
-    are requested. Only a muscle has samples; forces at edges shared by attachments are then divided between the attachments.
-    ``kept``: stored states, if any. InputError if stable states are to be followed with friction, or with contact along own
-    normals, as negative modes are not counted then.
+    """A ``body`` and how to solve it.
+
+    ``samples``: by name, the cells (n,) and the rest positions (n, 3) of points whose positions are requested. Only a muscle has
+    samples; forces at edges shared by attachments are then divided between the attachments. ``kept``: stored states, or None.
+    Raises InputError if stable states are to be followed with friction or with contact along the points' own normals, as negative
+    modes are not counted then.
     """
 
     body: Body

@@ -1,4 +1,4 @@
-"""Linear systems solved with a sparse factorisation (MUMPS), reused as long as it is a good preconditioner."""
+"""Linear systems solved with a sparse factorisation (MUMPS), which is reused as long as it is a good preconditioner."""
 
 from itertools import count
 
@@ -7,16 +7,17 @@ from petsc4py import PETSc
 
 from fem_reference.solvers.fenicsx.spent import Spent
 
-# Indices of MUMPS's INFOG: the error, and the number of negative pivots. Of its ICNTL: the last front on one process, as its pivots
-# are otherwise not counted; and the memory beyond the estimate, in per cent.
+# Indices in MUMPS's INFOG: the error, and the number of negative pivots. Indices in its ICNTL: the last front on one process, as
+# its pivots are otherwise not counted; and the memory beyond the estimate, in per cent.
 _ERROR, _NEGATIVE, _ROOT_BY_ONE, _MORE_MEMORY = 1, 12, 13, 14
-_FLOPS, _ENTRIES = 3, 29  # indices of RINFOG, the operations of a factorisation, and INFOG, the entries of its factors
+_FLOPS, _ENTRIES = 3, 29  # index in RINFOG of the operations of a factorisation, in INFOG of the entries of its factors
 # Above this number of unknowns the factors are compressed by blocks (BLR: ICNTL(35)), up to an error of 1e-5 (CNTL(7)). Compression
 # halves the time of a factorisation at 170 000 unknowns and gains nothing at 16 000.
 _COMPRESSED_FROM, _COMPRESSION, _DROPPED = 80_000, 35, 7
-# The cost of a back-substitution per entry of the factors, in operations of a factorisation (at 16 000 and 200 000 unknowns).
+# The cost of a back-substitution per entry of the factors, in operations of a factorisation (measured at 16 000 and 200 000
+# unknowns).
 _OPERATIONS = 22.0
-_LEAST, _MOST = 12, 80  # bounds of the number of Krylov iterations for which an old factorisation is kept
+_LEAST, _MOST = 12, 80  # bounds of the number of Krylov iterations for which an old factorisation is reused
 _INVERSE_ITERATIONS, _RESOLVED = 4, 0.1  # for the test of single precision
 _EXACT = 1e-10  # the relative residual of an exact solution, with which Newton's method converges quadratically
 _number = count()
@@ -27,7 +28,7 @@ class LinearSolveError(ArithmeticError):
 
 
 def fgmres(matrix: PETSc.Mat, most: int) -> PETSc.KSP:
-    """FGMRES with the present ``matrix``, for at most ``most`` iterations; the caller sets its preconditioner."""
+    """FGMRES for a ``matrix``, with at most ``most`` iterations; the caller sets the preconditioner."""
     krylov = PETSc.KSP().create(matrix.comm)
     krylov.setType("fgmres")
     krylov.setGMRESRestart(most)
@@ -45,8 +46,9 @@ def iterate(krylov: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, mos
 
 
 class Factorised:
-    """Solves with the present ``matrix``; if ``lagged``, by FGMRES preconditioned with an older factorisation, which is replaced
-    once FGMRES, for one system or for all since, took longer than a new factorisation. Factors are LDL^T if symmetric, else LU.
+    """Solves with the current ``matrix``. If ``lagged``, FGMRES is preconditioned with an older factorisation, which is replaced
+    once the iterations, for one system or for all systems since, have taken longer than a new factorisation. The factors are LDL^T
+    if the matrix is symmetric, otherwise LU.
     """
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, lagged: bool, precision: str, spent: Spent) -> None:
@@ -55,7 +57,7 @@ class Factorised:
         self._choose(precision)
         self.factorised: int | None = None  # PETSc's count of changes of the matrix when it was last factorised
         self.limit = _LEAST
-        self.since = 0  # Krylov iterations since the last factorisation, with a changed matrix
+        self.since = 0  # Krylov iterations with a changed matrix since the last factorisation
 
     def _choose(self, precision: str) -> None:
         self.precision, self.entries = precision, self.matrix.getInfo()["nz_used"]
@@ -76,11 +78,11 @@ class Factorised:
 
     @property
     def fresh(self) -> bool:
-        """True if the factors belong to the present matrix."""
+        """True if the factors belong to the current matrix."""
         return self.factorised == self.matrix.stateGet()
 
     def solve_exactly(self) -> bool:
-        """Factorise each matrix from now on, in double precision; True if that is a change."""
+        """Factorise every matrix from now on, in double precision. Returns True if this is a change."""
         if not self.lagged:
             return False
         self.lagged, self.factorised = False, None
@@ -89,14 +91,14 @@ class Factorised:
         return True
 
     def factorise(self) -> None:
-        """Factorise the present matrix; ``LinearSolveError`` if this fails."""
+        """Factorise the current matrix. Raises ``LinearSolveError`` if this fails."""
         if self.entries != self.matrix.getInfo()["nz_used"]:  # a matrix that has grown needs new factors
             self._choose(self.precision)
         options = PETSc.Options(self.krylov.getOptionsPrefix())
         with self.spent.on("factorisation"):
             self.preconditioner.setReusePreconditioner(False)
             self.krylov.setOperators(self.matrix, self.matrix)
-            # Only this ``setUp`` reads the option; at its end PETSc would warn of an option that is set but not read.
+            # Only this ``setUp`` reads the option; when PETSc ends, it would warn of an option that is set but not read.
             options.setValue("pc_precision", self.precision)
             self.preconditioner.setUp()
             options.delValue("pc_precision")
@@ -109,14 +111,14 @@ class Factorised:
         operations = self.factors.getMumpsRinfog(_FLOPS)
         self.spent.counts["factorisation_flops"] += operations
         counted = self.factors.getMumpsInfog(_ENTRIES)
-        entries = counted if counted > 0 else -1e6 * counted  # MUMPS gives a large number as minus its millions
+        entries = counted if counted > 0 else -1e6 * counted  # MUMPS reports a large number as minus its millions
         self.limit = int(min(max(operations / entries / _OPERATIONS, _LEAST), _MOST))
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
-        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``, or exactly; ``LinearSolveError`` if this fails."""
+        """Solve for ``x`` to ``tolerance`` times the norm of ``b``, or exactly if not ``lagged``. Raises ``LinearSolveError``."""
         if not self.lagged:
             tolerance = _EXACT
-        # A factorisation is replaced once its iterations took as long as a new one: so the time is at most twice the minimum.
+        # A factorisation is replaced once its iterations have taken as long as a new one, so the time is at most twice the minimum.
         serves = self.fresh or (self.lagged and self.since < self.limit)
         if self.factorised is not None and serves and self._iterate(b, x, tolerance, self.limit):
             return
@@ -130,8 +132,8 @@ class Factorised:
         return converged
 
     def negative_pivots(self) -> int:
-        """The number of negative pivots of the present matrix, which is factorised if necessary. Where single precision does not
-        resolve the softest directions, double precision is used from then on. ``LinearSolveError`` if it cannot be factorised.
+        """The number of negative pivots of the current matrix, which is factorised if necessary. If single precision does not
+        resolve the softest directions, double precision is used from then on. Raises ``LinearSolveError`` on failure.
         """
         if not self.fresh:
             self.factorise()
@@ -141,8 +143,10 @@ class Factorised:
         return int(self.factors.getMumpsInfog(_NEGATIVE))
 
     def _resolved(self) -> bool:
-        """True if the factorisation M matches the matrix A in the softest directions too: for a vector v, turned towards them by
-        inverse iteration, M^-1 A v equals v up to a tenth. So along none of them can M and A differ in sign.
+        """True if the factorisation M matches the matrix A even in the softest directions.
+
+        For a vector v that inverse iteration has turned towards these directions, M^-1 A v must equal v to within a tenth. M and A
+        then cannot differ in sign along any of them.
         """
         random = np.random.default_rng(self.matrix.comm.rank)
         image = self.matrix.createVecLeft()

@@ -26,11 +26,11 @@ _ON_BIMEDIANS = (0.02277083677974708, 0.010913290341505138)
 
 
 def rule(element: str, degree: int | None) -> tuple[Floats, Floats]:
-    """Points (q, 3) and weights (q,) on the reference cell of an element: a rule of ``degree``, by default of ``DEGREE``.
+    """The points (q, 3) and weights (q,) of a quadrature rule of ``degree``, by default ``DEGREE``, on an element's reference cell.
 
-    On quadratic tetrahedra the default rule includes the vertices. There det F of a quadratic displacement is smallest in an
-    inverting cell, and an energy that grows without bound as det F falls to zero keeps det F positive where the energy is
-    evaluated. Standard rules leave the vertices out.
+    On quadratic tetrahedra the default rule includes the vertices, which standard rules leave out. In a cell that inverts, det F of
+    a quadratic displacement is smallest at a vertex, and an energy that grows without bound as det F falls to zero keeps det F
+    positive where the energy is evaluated.
     """
     kind, order, _ = ELEMENTS[element]
     if degree is None and kind == "tetrahedron" and order == 2:
@@ -40,7 +40,8 @@ def rule(element: str, degree: int | None) -> tuple[Floats, Floats]:
 
 
 def with_vertices() -> tuple[Floats, Floats]:
-    """A rule of 18 points on the unit tetrahedron, exact to degree 5: vertices, twice 4 on the medians and 6 on the bimedians.
+    """A rule of 18 points on the unit tetrahedron, exact to degree 5: the vertices, twice 4 points on the medians and 6 on the
+    bimedians.
 
     Weights and coordinates solve the seven moment equations of degrees 0, 2, 3, 4, 4, 5 and 5 for the given weight of a vertex;
     for a weight of 0 they agree with Walkington 2000, Quadrature on simplices of arbitrary dimension.
@@ -57,7 +58,7 @@ def with_vertices() -> tuple[Floats, Floats]:
 
 
 def lagrange(kind: str, degree: int) -> Any:
-    """The Lagrange element of ``degree`` on a ``kind`` of cell, as DOLFINx makes it."""
+    """The Lagrange element of ``degree`` on this ``kind`` of cell, as DOLFINx creates it."""
     return basix.create_element(basix.ElementFamily.P, basix.CellType[kind], degree, basix.LagrangeVariant.gll_warped)
 
 
@@ -70,8 +71,8 @@ def geometry(msh: mesh.Mesh, points: Floats, cells: Ints | slice) -> tuple[Float
 
 @dataclass(frozen=True, eq=False)
 class Tabulated:
-    """A part of the unknowns at reference points of cells: the ``values`` (q, k) of basis functions there, their ``slopes``
-    (3, q, k) along the reference coordinates, and the ``unknowns`` (m, k, c) of the cells' nodes.
+    """Interpolation of some of the unknowns to reference points of cells. ``values`` (q, k): the basis functions at the points;
+    ``slopes`` (3, q, k): their derivatives along the reference coordinates; ``unknowns`` (m, k, c): those of the cells' nodes.
     """
 
     values: Floats
@@ -79,19 +80,19 @@ class Tabulated:
     unknowns: Ints
 
     def at(self, unknowns: Floats) -> Floats:
-        """The values (m, q, c) of ``unknowns`` (n,)."""
+        """The values (m, q, c) at the points, for given ``unknowns`` (n,)."""
         return np.asarray(self.values @ unknowns[self.unknowns])
 
 
 def tabulate(space: fem.FunctionSpace, unknowns: Ints, points: Floats) -> Tabulated:
-    """A part of the unknowns at reference ``points`` (q, 3): its ``space``, and the ``unknowns`` (m, k, c) of the cells' nodes."""
+    """Interpolation to reference ``points`` (q, 3) in a ``space``; ``unknowns`` (m, k, c): the unknowns of the cells' nodes."""
     element: Any = space.element.basix_element
     values, *slopes = element.tabulate(1, points)[..., 0]
     return Tabulated(values, np.stack(slopes), unknowns)
 
 
 class Displacement:
-    """The displacement among the ``unknowns`` of a body: its ``space`` and the unknowns ``dofs`` (n, 3) of its nodes."""
+    """The displacement part of the ``unknowns`` of a body: its ``space``, and the unknowns ``dofs`` (n, 3) of its nodes."""
 
     def __init__(self, unknowns: fem.Function) -> None:
         self.unknowns = unknowns
@@ -104,7 +105,7 @@ class Displacement:
 
 
 def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
-    """The mesh of the first rank, distributed over all ranks."""
+    """Distribute the mesh that the first rank holds over all ranks."""
     element = basix.ufl.element("Lagrange", cells.kind, cells.degree, shape=(3,))
     ours = reference_nodes(cells.kind, cells.degree)
     nodes = lagrange(cells.kind, cells.degree).points
@@ -115,7 +116,7 @@ def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
 
 
 def local_facets(msh: mesh.Mesh, regions: Iterable[Ints]) -> list[Ints]:
-    """This rank's facets in each of ``regions``, which are arrays (f, k) of the corners of facets in the original mesh."""
+    """This rank's facets in each of the ``regions``, which are arrays (f, k) of the corners of facets in the original mesh."""
     topology, facet = msh.topology, msh.topology.dim - 1
     for start, end in ((facet, facet + 1), (facet + 1, facet), (facet, 0), (0, facet + 1), (facet + 1, 0)):
         topology.create_connectivity(start, end)
@@ -129,14 +130,14 @@ def local_facets(msh: mesh.Mesh, regions: Iterable[Ints]) -> list[Ints]:
 
 
 def facet_measure(msh: mesh.Mesh, regions: Iterable[Ints], degree: int) -> ufl.Measure:
-    """The measure of this rank's facets with quadrature of a ``degree``; its subdomains have the order of the ``regions``."""
+    """The measure of this rank's facets, with quadrature of a ``degree``. Its subdomains are in the order of the ``regions``."""
     kind = fem.IntegralType.exterior_facet
     parts = [(i, fem.compute_integration_domains(kind, msh.topology, facets)) for i, facets in enumerate(regions)]
     return ufl.Measure("ds", domain=msh, subdomain_data=parts, metadata={"quadrature_degree": degree})
 
 
 def unknowns(msh: mesh.Mesh, element: str) -> fem.Function:
-    """The unknowns of a body: displacement, and pressure if the element has it."""
+    """The unknowns of a body: the displacement, and the pressure if the element has one."""
     kind, degree, pressure = ELEMENTS[element]
     parts = [basix.ufl.element("Lagrange", kind, degree, shape=(3,))]
     if pressure is not None:

@@ -1,4 +1,4 @@
-"""The softest mode of a body: departures along it from an unstable equilibrium, and limit points, at which its stiffness is 0.
+"""The softest mode of a body: leaving an unstable equilibrium along it, and limit points, at which the mode's stiffness is 0.
 
 At a limit point the path of equilibria ends: at a later frame there is no equilibrium nearby.
 """
@@ -18,16 +18,17 @@ _ITERATIONS = 40  # the number of inverse iterations
 _LARGER = (1, 2, 4, 8)  # factors of the perturbation, tried in turn if the state returns or no solution is found
 _SHIFT, _GROWTH = 1e-6, 4.0
 _DIFFERENCE = 1e-3  # the interval for differences along the path, as a fraction of the smallest load step
-# A limit point is reported up to this distance, in smallest load steps: the step that failed was up to two of them long, and the
-# distance is known only up to a factor.
+# A limit point is reported if it is at most this many smallest load steps ahead: the step that failed was up to two of them long,
+# and the distance is known only to within a factor.
 _NEAR = 4
 _SOFT = 0.3  # Near a limit point, the stiffness of the softest mode is at most this fraction of its value at rest.
 
 
 def softest(body: AssembledBody, linear: LinearSolver) -> PETSc.Vec:
-    """The mode whose eigenvalue has the smallest magnitude, of the matrix of ``linear``; its displacements have norm 1.
+    """The mode of the matrix of ``linear`` whose eigenvalue has the smallest magnitude; its displacements have norm 1.
 
-    By inverse iteration from a random start; only displacements have a mass. ``LinearSolveError`` if no displacement is free.
+    It is found by inverse iteration from a random start, in which only displacements have a mass. Raises ``LinearSolveError`` if no
+    displacement is free.
     """
     moves = _free(body)
     if not body.comm.allreduce(moves.any(), MPI.LOR):
@@ -53,14 +54,14 @@ def _free(body: AssembledBody) -> Floats:
 
 
 def _displacements(body: AssembledBody, mode: PETSc.Vec) -> Floats:
-    """The displacements (n, 3) of the nodes of this rank in a ``mode``."""
+    """The displacements (n, 3) of this rank's nodes in a ``mode``."""
     found = np.zeros(body.system.size)
     found[: body.system.owned] = mode.array
     return found[body.displacement.dofs]
 
 
 def leave(body: AssembledBody, frame: float, share: float) -> float | None:
-    """Perturb the present state, at ``frame``, along its lowest mode by the body's size times ``share``, and solve again until
+    """Perturb the current state, at ``frame``, along its lowest mode by ``share`` times the size of the body and solve again, until
     there are fewer negative modes. Returns the perturbation [mm]; None if the state is stable or no other is found. Collective.
     """
     if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
@@ -82,8 +83,8 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
 
 
 def _lowest(body: AssembledBody, pressures: int) -> Floats:
-    """The displacement of the unknowns (n,), 1 mm at most, along which the energy falls most, by inverse iteration with a shift
-    for which the tangent has no negative pivots except those of its ``pressures``.
+    """The displacement (n,) of the unknowns, at most 1 mm, along which the energy decreases most, by inverse iteration. The shift
+    is large enough that the only negative pivots are those of the ``pressures``, which is the number of pressure unknowns.
     """
     system, free, dofs = body.system, _free(body), body.displacement.dofs
     system.linearise()
@@ -101,7 +102,7 @@ def _lowest(body: AssembledBody, pressures: int) -> Floats:
 
 
 def _shifted(body: AssembledBody, shift: Floats) -> Factorised:
-    """The factors of the tangent with ``shift`` (n,) added to its diagonal."""
+    """A factorisation of the tangent with ``shift`` (n,) added to its diagonal."""
     raised, entries = body.system.matrix.duplicate(copy=True), body.system.matrix.getDiagonal()
     entries.array[:] += shift
     raised.setDiagonal(entries)
@@ -127,8 +128,8 @@ def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
     """The limit point that follows the last good state within a few load steps of the smallest size ``step``; None if there is
     none or it cannot be found. Collective.
 
-    Before a limit point the lowest eigenvalue of the tangent falls as the square root of the remaining path. So its square is
-    linear, and the remaining path is half of the eigenvalue divided by its slope along the path, as in a Newton step.
+    Before a limit point, the lowest eigenvalue of the tangent falls as the square root of the remaining path. Its square is
+    therefore linear, and the remaining path is half of the eigenvalue divided by its slope along the path, as in a Newton step.
     """
     if body.stability is None or body.clock.matters:
         return None
@@ -170,7 +171,7 @@ def _limit_point(body: AssembledBody, difference: float) -> LimitPoint | None:
 
 
 def _motion(body: AssembledBody, difference: float) -> Floats:
-    """The first-order change of the unknowns (n,) from the present state over a small ``difference`` in frames."""
+    """The first-order change (n,) of the unknowns from the current state over a small ``difference`` in frames."""
     system, frame = body.system, body.at + difference
     body.set_frame(frame)
     moves = -system.missing()
@@ -187,14 +188,14 @@ def _motion(body: AssembledBody, difference: float) -> Floats:
 
 
 def _stiffness(body: AssembledBody, mode: PETSc.Vec) -> float:
-    """Twice the energy of a ``mode`` with the present tangent."""
+    """Twice the energy of a ``mode`` with the current tangent."""
     image = mode.duplicate()
     body.system.matrix.mult(mode, image)
     return float(image.dot(mode))
 
 
 def _largest(body: AssembledBody, mode: PETSc.Vec) -> tuple[float, float, float]:
-    """The rest position [mm] of the largest displacement of a mode."""
+    """The rest position [mm] of the node with the largest displacement in a ``mode``."""
     lengths = np.linalg.norm(_displacements(body, mode), axis=1)
     place = body.displacement.space.tabulate_dof_coordinates()[np.argmax(lengths)].tolist()
     _, (x, y, z) = max(body.comm.allgather((float(lengths.max()), place)))

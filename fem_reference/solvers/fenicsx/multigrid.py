@@ -24,7 +24,7 @@ _STALE = 15  # iterations up to which a preconditioner is never stale
 
 
 class Multigrid:
-    """Solves with the matrix of a ``system`` on one rank, whose element is quadratic and has a pressure."""
+    """Solves with the matrix of a ``system`` on one rank. The element must be quadratic and have a pressure."""
 
     def __init__(self, system: System) -> None:
         self.system, self.matrix, self.spent = system, system.matrix, system.spent
@@ -39,7 +39,7 @@ class Multigrid:
         self.stale, self.first = True, 0
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
-        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` if this fails."""
+        """Solve for ``x``, to ``tolerance`` times the norm of ``b``. Raises ``LinearSolveError`` if this fails."""
         fresh = self.stale
         if fresh:
             self._renew()
@@ -59,7 +59,7 @@ class Multigrid:
         return False
 
     def _renew(self) -> None:
-        """Build the preconditioner: the pressure from the volume residual, then the displacement from the remaining forces."""
+        """Build the preconditioner. It solves for the pressure first, then for the displacement from the remaining forces."""
         with self.spent.on("factorisation"):
             kinds: Any = PETSc.PC  # the stubs declare its members as numbers
             blocks = PETSc.PC().create(self.matrix.comm)
@@ -107,7 +107,7 @@ class Multigrid:
 
     def _interpolation(self, displaced: Ints) -> tuple[PETSc.Mat, Ints]:
         """The interpolation from the linear to the quadratic element on the same cells, 0 for prescribed unknowns; and the fixed
-        unknowns of the linear element: at corners where the unknown of the quadratic element is fixed.
+        unknowns of the linear element, at the corners where the quadratic element has a fixed unknown.
         """
         space, parents = self.system.unknowns.function_space.sub(0).collapse()
         corners = interpolation_matrix(fem.functionspace(space.mesh, ("Lagrange", 1, (3,))), space)
@@ -121,7 +121,7 @@ class Multigrid:
         return self._matrix(csr_array(found)), fixed
 
     def _schur(self) -> PETSc.Mat:
-        """Minus the mass matrix of the pressure, divided by local stiffness, instead of the Schur complement."""
+        """Minus the mass matrix of the pressure divided by the local stiffness; it replaces the Schur complement."""
         system, cells = self.system, self.system.cells
         blocks = cells.softness() * system.tangent.unit**2
         names = self.number[cells.unknowns[:, 3 * cells.nodes :]]

@@ -12,7 +12,7 @@ from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.system import System
 
-# A step is halved until det F keeps this fraction of its value everywhere, but not below this fraction of the full step.
+# A step is halved until det F keeps _KEPT times its value at every point, or the step is shorter than _SHORTEST times a full step.
 _KEPT, _SHORTEST = 0.1, 1e-2
 # Eisenstat and Walker 1996 (doi 10.1137/0917003), choice 2: the tolerance of the first linear system, then the factor of later
 # tolerances and their bounds.
@@ -26,7 +26,7 @@ _PAST = 1e-2
 
 class Newton:
     """Newton's method on a ``system``, with full steps from ``linear``. There is no line search: it would weigh forces [N] against
-    volumes [mm3], and would stall if bodies bend or are soft.
+    volumes [mm3], and would stall for bodies that bend or are soft.
     """
 
     def __init__(
@@ -38,9 +38,9 @@ class Newton:
         self.thrown = 0
 
     def solve_among(self, contact: ContactForces | None, frame: float) -> Attempt:
-        """Solve as ``solve`` does; first without ``contact`` if the present state has no contact pressure. If the result also has
-        none, it is final, as contact would give the same result. Otherwise it is discarded, and its iterations count as ``thrown``,
-        as they do not show how hard the load step is.
+        """Solve as ``solve`` does, at first without ``contact`` if the current state has no contact pressure. If the result has no
+        contact pressure either, it is final, as contact would give the same result. Otherwise it is discarded, and its iterations
+        count as ``thrown``, as they do not show how hard the load step is.
         """
         system, before = self.system, np.array(self.system.unknowns.x.array)
         system.contact = contact if contact and contact.presses() else None
@@ -81,7 +81,7 @@ class Newton:
         return Attempt("converged", len(residuals) - 1, tuple(residuals))
 
     def _hopeless(self, residuals: list[float]) -> str | None:
-        """The reason to stop iterating after ``residuals``, None if there is none."""
+        """The reason to stop iterating after ``residuals``; None to continue."""
         iterations = len(residuals) - 1
         if not np.isfinite(residuals[-1]):
             return f"reached in {iterations} iterations a state where a law, or a prescribed path, has no value"
@@ -92,20 +92,22 @@ class Newton:
         return None
 
     def _failed(self, residuals: list[float], why: str) -> Attempt:
-        """The record of a failed attempt: inverted if det F is not positive in its last state."""
+        """The record of a failed attempt, with status *inverted* if det F is not positive in its last state, else *diverged*."""
         status: Status = "diverged" if self.determinants.smallest().value > 0 else "inverted"
         return Attempt(status, len(residuals) - 1, tuple(residuals), f"Newton's method {why}")
 
     def _begin(self, frame: float) -> float:
-        """Assemble the first iteration's system. Bones at their next poses would overlap points that have not moved yet, and the
-        iteration would start from meaningless forces. So this system has the contact pressures of the last state, changed to first
-        order by the motion of the bones.
+        """Assemble the system of the first iteration.
+
+        With the bones in their next poses, points that have not moved yet would overlap them, and the iteration would start from
+        meaningless forces. The first system therefore has the contact pressures of the last state, changed to first order by the
+        motion of the bones.
         """
         moves = -self.system.missing()
         if self.system.contact is None:
             return self._linearise(moves)
         norm = self._linearise(moves, self.system.contact.predicted(frame, moves))
-        if norm <= self.residual:  # nothing else drives a step, and only the new gaps show contact
+        if norm <= self.residual:  # only new contact can drive the step, and only the new gaps show it
             self._meet(frame)
             norm = self._linearise(moves)
         return norm
@@ -123,7 +125,7 @@ class Newton:
         if norm == 0 or last == 0:
             return _FIRST
         wanted = _FIRST if np.isnan(last) else float(np.clip(_FACTOR * (norm / last) ** 2, _TIGHTEST, _LOOSEST))
-        # In linear systems the residual of a pressure is multiplied by the unit of pressure.
+        # In linear systems the residual of a pressure is multiplied by the scale of the pressure.
         enough = self.residual * min(1.0, self.system.tangent.unit)
         if wanted * norm < enough:
             wanted = min(wanted, _PAST * enough / norm)

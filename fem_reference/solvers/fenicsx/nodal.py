@@ -13,12 +13,12 @@ from fem_reference.solvers.fenicsx.rest_stress import RestStress
 
 
 class Nodal:
-    """Gathers values of the ``cells`` of a body from the ranks that own them."""
+    """Gathers values on the ``cells`` of a body from the ranks that own the cells."""
 
     def __init__(
         self, cells: Cells, own: Ints, element: str, displacement: Displacement, clock: Clock, rest: RestStress | None
     ) -> None:
-        """``own``: the numbers of this rank's cells in the body, in the order of the rank."""
+        """``own``: the indices in the body of this rank's cells, in the order of the rank."""
         kind, degree, order = ELEMENTS[element]
         self.cells, self.own, self.clock, self.unknowns = cells, own, clock, displacement.unknowns.x
         self.rest = rest
@@ -32,13 +32,13 @@ class Nodal:
             self.pressure = tabulate(space, space.dofmap.list[: len(own), :, None], points)
 
     def positions(self) -> Floats:
-        """The present positions (n, 3) [mm] of the nodes of the mesh."""
+        """The current positions (n, 3) [mm] of the nodes of the mesh."""
         points = np.array(self.cells.points)
         points[self.cells.cells] += self.gathered(self.moves.at(self.unknowns.array))
         return points
 
     def state(self) -> NodalState:
-        """The present state of all cells."""
+        """The current state of all cells."""
         before, rate = np.zeros((0, 0, 3)), 0.0
         if self.clock.step is not None:
             before = self._displaced(self.clock.step.before.x.array)
@@ -50,17 +50,17 @@ class Nodal:
         return replace(found, response=self._displaced(response), response_pressure=self._pressed(response))
 
     def _displaced(self, unknowns: Floats) -> Floats:
-        """The displacement (m, k, 3) [mm] of all cells in ``unknowns`` (n,)."""
+        """The displacement (m, k, 3) [mm] of all cells for given ``unknowns`` (n,)."""
         return self.gathered(self.displacement.at(unknowns))
 
     def _pressed(self, unknowns: Floats) -> Floats:
-        """The pressure (m, l) [MPa] of all cells in ``unknowns`` (n,), l = 0 where there is none."""
+        """The pressure (m, l) [MPa] of all cells for given ``unknowns`` (n,); l = 0 for an element without a pressure."""
         if self.pressure is None:
             return np.zeros((len(self.cells.cells), 0))
         return self.gathered(self.pressure.at(unknowns)[..., 0])
 
     def gathered(self, mine: Floats | Ints) -> Floats:
-        """The rows of all cells (m, ...), on every rank, gathered from those of each rank's own cells."""
+        """The rows of all cells (m, ...), gathered on every rank from the rows ``mine`` of each rank's cells."""
         gathered = np.zeros((len(self.cells.cells), *mine.shape[1:]))
         for own, part in self.comm.allgather((self.own, mine)):
             gathered[own] = part

@@ -1,4 +1,4 @@
-"""Pairs of points and facets near each other; in one part of a surface, of facets that face each other and share no node."""
+"""Pairs of points and facets that are near each other, and pairs of facets in one part of a surface that face each other."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,12 +8,13 @@ from scipy.spatial import cKDTree
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx.facets import Facets
 
-# Facets do not face each other if the cosine between their normals is above this; other facets may in places, as they bend.
+# Two facets do not face each other if the cosine of the angle between their normals at their centres is above this value. Below it,
+# they may face each other at some points, because facets are curved.
 _ALIKE = 0.5
 
 
 class OwnPairs:
-    """Finds pairs among the ``facets`` of one part."""
+    """Finds pairs of nearby facets among the ``facets`` of one part of a surface."""
 
     def __init__(self, facets: Facets) -> None:
         self.facets, self.count = facets, len(facets.rest)
@@ -22,12 +23,14 @@ class OwnPairs:
         self.next_to = csr_array(at @ at.T > 0)
 
     def beside(self, one: Ints, other: Ints) -> NDArray[np.bool_]:
-        """True (n,) where facets ``one`` (n,) are ``other`` (n,) or share a node with them."""
+        """True (n,) where the facet in ``one`` (n,) is the facet in ``other`` (n,) or shares a node with it."""
         return np.asarray(self.next_to[one, other]).ravel() if len(one) else np.zeros(0, bool)
 
     def near(self, balls: tuple[Floats, Floats], reach: Floats, *states: Floats) -> tuple[Ints, Ints]:
-        """The facets (p,) whose ``balls``, middles (m, 3) and radii (m,) [mm], come within ``reach`` (m,) of the middles of other
-        facets (p,) that they face in one of the ``states``, nodes (m, k, 3) [mm], and with which they share no node.
+        """Pairs of facets (p,) and (p,) that face each other in one of the ``states`` and share no node.
+
+        ``balls``: the centres (m, 3) and radii (m,) [mm] of balls around the facets. The ball of the first facet of a pair comes
+        within ``reach`` (m,) [mm] of the centre of the second facet. ``states``: positions (m, k, 3) [mm] of the nodes.
         """
         middles, radii = balls
         found = cKDTree(middles).query_ball_point(middles, reach + radii.max())
@@ -41,12 +44,12 @@ class OwnPairs:
         return one[apart], other[apart]
 
     def _normals(self, nodes: Floats) -> Floats:
-        """The normals (m, 3) in the middles of the facets, with their ``nodes`` (m, k, 3) [mm]."""
+        """The normals (m, 3) at the centres of the facets, whose ``nodes`` (m, k, 3) [mm] are given."""
         return self.facets.places(nodes, np.arange(self.count), np.full((self.count, 2), 1 / 3)).normal
 
 
 def pairs(points: Floats, middles: Floats, reach: Floats) -> tuple[Ints, Ints]:
-    """Points (p,) and facets (p,) where the point is within ``reach`` (m,) [mm] of the ``middles`` (m, 3) of the facet."""
+    """Pairs of points (p,) and facets (p,), the point within ``reach`` (m,) [mm] of the facet's centre (``middles``, (m, 3))."""
     low, high = (middles - reach[:, None]).min(axis=0), (middles + reach[:, None]).max(axis=0)
     near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
     if not len(near):

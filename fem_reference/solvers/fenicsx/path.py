@@ -12,9 +12,9 @@ from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.determinants import Determinants, Extreme
 from fem_reference.solvers.fenicsx.system import System
 
-# On the straight line from one state to the next, det F is a cubic polynomial and has to stay above this fraction of the smaller of
-# its end values. A turn by 143 degrees within a step reduces det F to a tenth; half a turn, or a mirrored state on the line, to 0
-# or below.
+# On the straight line from one state to the next, det F is a cubic polynomial. It has to stay above this fraction of the smaller of
+# its end values. A rotation by 143 degrees within a step reduces det F to a tenth; a rotation by 180 degrees, or a mirrored state
+# on the line, reduces it to 0 or below.
 KEPT = 0.1
 _SHARES = (0.0, 1 / 3, 2 / 3, 1.0)
 _CUBIC = np.linalg.inv(np.vander(_SHARES, 4))  # converts values at these fractions to the coefficients of a cubic
@@ -35,7 +35,7 @@ class Path:
 
     def jumped(self, before: Floats) -> Extreme | None:
         """The smallest det F, divided by the smaller of its end values, on the straight line from the unknowns ``before`` to the
-        present ones; None if it exceeds ``KEPT``, as it does in a body that deforms steadily in small steps.
+        current ones; None if it exceeds ``KEPT``, as it does in a body that deforms steadily in small steps.
         """
         unknowns = self.system.unknowns.x
         after, values = np.array(unknowns.array), []
@@ -57,14 +57,15 @@ class Path:
         return Trouble("diverged", f"to a state on another path: {way} {jump.value:.2g} of its end value, {place}")
 
     def settle(self, energy: float, halfway: Callable[[], bool] | None = None, *, connected: bool = True) -> None:
-        """Take the present state as the next one, with the stored ``energy`` [N mm]; if it is ``connected`` with the previous
+        """Accept the current state as the next one, with the stored ``energy`` [N mm]. If it is ``connected`` with the previous
         state, compare the growth of the energy with the work of the internal forces, by the trapezoidal rule.
 
-        The rule is exact if forces are linear in the displacement, and its error is of second order in the step: for a law that
+        The rule is exact if forces are linear in the displacement. Its error is of second order in the step; for a law that
         stiffens, or a rotation, it is tenths of the energy in the first step from rest. So if the difference exceeds
-        ``ENERGY_GAP``, the function ``halfway`` solves for a state halfway, puts it into the unknowns, which are restored
-        afterwards, and returns True if it succeeds. Then Simpson's rule is used, whose error is of fourth order. In a jump, either
-        rule shows a fall of energy without work. ``gap``: the largest difference since it was last read, over the maximum energy.
+        ``ENERGY_GAP``, the function ``halfway`` is called: it solves for a state halfway, leaves it in the unknowns, which are
+        restored afterwards, and returns True if it succeeds. Simpson's rule is then used, whose error is of fourth order. In a
+        jump, either rule shows a decrease of the energy without work. ``gap``: the largest difference since it was last read,
+        divided by the maximum energy.
         """
         states = [
             (self.unknowns, self.forces),
@@ -81,8 +82,8 @@ class Path:
         self.energy, (self.unknowns, self.forces) = energy, states[-1]
 
     def _gap(self, energy: float, states: list[tuple[Floats, Floats]]) -> float:
-        """The growth of the energy that no work explains, up to the last of ``states`` (unknowns and forces), divided by the
-        maximum energy so far; there are two states, or three at equal intervals of time.
+        """The growth of the energy, up to the last of ``states``, that no work explains, divided by the maximum energy so far.
+        ``states``: the unknowns and forces of two states, or of three states at equal intervals of time.
         """
         own = self.system.owned
         work = sum(float(np.dot(forces[:own], moves[:own])) for forces, moves in _products(states))
@@ -96,8 +97,8 @@ class Path:
 
 
 def _products(states: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
-    """Weighted forces and the displacements over which they do work: for two ``states`` by the trapezoidal rule on a straight line,
-    for three by Simpson's rule on a parabola over time.
+    """Pairs of weighted forces and the displacements over which they do work: for two ``states`` by the trapezoidal rule on a
+    straight line, for three by Simpson's rule on a parabola over time.
     """
     if len(states) == 2:
         (start, first), (end, last) = states
@@ -128,7 +129,7 @@ def least(values: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class KnownState:
-    """``unknowns`` (n,) in equilibrium under ``acting`` (m,), all numbers that determine it, and its ``negative_modes``."""
+    """The ``unknowns`` (n,) of an equilibrium, the values ``acting`` (m,) that determine it, and its ``negative_modes``."""
 
     acting: Floats
     unknowns: Floats
@@ -136,20 +137,20 @@ class KnownState:
 
 
 class Known:
-    """The states of a run so far; the same states are kept on all ranks of ``comm``."""
+    """The states of a run so far; all ranks of ``comm`` store the same states."""
 
     def __init__(self, comm: MPI.Comm) -> None:
         self.comm = comm
         self.states: list[KnownState] = []
 
     def add(self, state: KnownState) -> None:
-        """Keep a state, which is in equilibrium."""
+        """Store a state, which is in equilibrium, and drop the oldest states beyond the limit on memory."""
         self.states.append(state)
         size = self.comm.allreduce(state.unknowns.nbytes + state.acting.nbytes, MPI.MAX)
         del self.states[: max(0, len(self.states) - max(1, int(_MOST / size)))]
 
     def find(self, acting: Floats) -> KnownState | None:
-        """The state under ``acting``, None if there is none."""
+        """The state with the values ``acting`` (m,); None if there is none."""
         same = np.array([np.abs(one.acting - acting).max(initial=0.0) <= _SAME for one in self.states], bool)
         self.comm.Allreduce(MPI.IN_PLACE, same, MPI.LAND)
         return self.states[int(np.argmax(same))] if same.any() else None

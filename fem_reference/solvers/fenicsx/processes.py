@@ -30,7 +30,7 @@ _SETTINGS = {
 # The number of ranks that is accepted on any machine; more ranks need a machine with as many cores.
 _MOST_RANKS = 8
 PATIENCE = 5.0  # [s] from the request to end a process to the signal that kills it
-# The allowed clock time, as a multiple of the limit of processor time plus the start-up time; a run beyond it allows no conclusion.
+# The allowed clock time, as a multiple of the limit on processor time plus the start-up time; a longer run allows no conclusion.
 CLOCK, _START = 20, 3.0  # [s]
 _GLANCE = 0.02  # [s] between checks of the processor time
 MARK = "@fem_reference "  # begins each line of output that names the file of a pickled frame or outcome
@@ -42,21 +42,21 @@ def installed() -> bool:
 
 
 def require_installed() -> None:
-    """Raise MissingSoftware where FEniCSx is not installed."""
+    """Raise MissingSoftware if FEniCSx is not installed."""
     if not installed():
         way = "pip install 'fem_reference[fenicsx]' (Linux x86-64), or conda's fenics-dolfinx"
         raise MissingSoftware(f"FEniCSx is not installed: {way}")
 
 
 def mpiexec() -> str | None:
-    """The wheel's own ``mpiexec`` next to the interpreter, else one on the PATH, maybe of another MPI; None if there is none."""
+    """The wheel's own ``mpiexec`` next to the interpreter, otherwise one on the PATH, perhaps of another MPI; None if missing."""
     beside = Path(sys.executable).with_name("mpiexec")
     return str(beside) if beside.exists() else shutil.which("mpiexec")
 
 
 def command_line(ranks: int) -> list[str]:
-    """The worker's command line. InputError for more ranks than this machine accepts, MissingSoftware without ``mpiexec``."""
-    # mpi4py's own runner ends all ranks after an error on one; without the runner the others would wait forever.
+    """The worker's command line. Raises InputError for more ranks than the machine allows, MissingSoftware without ``mpiexec``."""
+    # mpi4py's own runner ends all ranks after an error on one; without it the other ranks would wait forever.
     worker, runner = command("-m", "mpi4py", "-m", f"{__package__}.worker"), mpiexec()
     if ranks == 1:
         return worker
@@ -68,7 +68,7 @@ def command_line(ranks: int) -> list[str]:
 
 
 class Process:
-    """A process of the command ``words``. It reads names of job files, one per line; its error output is read continuously."""
+    """A process that runs the command ``words``. It reads names of job files, one per line; error output is read continuously."""
 
     def __init__(self, words: list[str]) -> None:
         pipe = subprocess.PIPE
@@ -84,8 +84,8 @@ class Process:
         self.listener.start()
 
     def solve(self, job: Path, time_limit: float | None, sink: Sink) -> Outcome:
-        """Solve the job in a file and pass each frame to ``sink``. The outcome of a process that dies is *crashed*; a process over
-        the time limit is ended, and the outcome is *timed out* or *stalled*.
+        """Solve the job in a file and pass each frame to ``sink``. If the process dies, the outcome is *crashed*. If it exceeds the
+        time limit, it is ended, and the outcome is *timed out* or *stalled*.
         """
         kept = "no frame was reached"
         with self._limited(time_limit):
@@ -110,14 +110,14 @@ class Process:
         return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({self._reason()}); {kept}")
 
     def _reason(self) -> str:
-        """The most informative line of the error output: the last that names an error, else the last."""
+        """The most informative line of the error output: the last line that names an error, otherwise the last line."""
         named = [line for line in self.errors if re.match(r"\w*(\.\w+)*(Error|Exception)\b", line)]
         return (named or self.errors or ["without a message"])[-1].strip()
 
     @contextmanager
     def _limited(self, time_limit: float | None) -> Iterator[None]:
-        """A context in which the process is ended if it, or a process that it starts, takes more than ``time_limit`` [s] of
-        processor time, or about ``CLOCK`` times as much clock time, which allows no conclusion.
+        """A context in which the process is ended if it, or a process that it has started, takes more than ``time_limit`` [s] of
+        processor time, or about ``CLOCK`` times as much clock time. The latter allows no conclusion.
         """
         if time_limit is None:
             yield
@@ -161,13 +161,13 @@ class Process:
                 self.process.wait(timeout=0.5)
 
     def finish(self) -> None:
-        """Let the process end by itself, as there are no more jobs."""
+        """Wait until the process ends by itself, as there are no more jobs."""
         with suppress(BrokenPipeError):
             self.input.close()
         self.process.wait()
 
     def end(self) -> None:
-        """End the process at once."""
+        """End the process immediately."""
         self._stop()
         self.listener.join()
         for stream in (self.input, self.output, self.error_output):

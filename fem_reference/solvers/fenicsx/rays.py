@@ -1,7 +1,8 @@
-"""Contact along the points' own normals: a point presses on the place where the line along its normal meets the other side.
+"""Contact along the normals of the points: each point presses on the other side where the line along the point's normal meets it.
 
-A point's own normal never jumps, and neighbouring facets meet the line at one place at their common edge. So forces are continuous
-there. A force and its reaction act along one line, so forces and moments balance to rounding, although they have no energy.
+The normal of a point never jumps, and at the common edge of two facets the line meets both facets at the same position, so forces
+are continuous there. A force and its reaction act along one line, so forces and moments balance to rounding, although the forces
+have no energy.
 """
 
 from dataclasses import dataclass
@@ -13,19 +14,20 @@ from fem_reference.solvers.fenicsx.facets import FacetPlaces
 from fem_reference.solvers.fenicsx.own_pairs import pairs
 from fem_reference.solvers.fenicsx.touching_passes import GRAZING, Met, Pass, PressedPoints, Settled
 
-_FRONTAL = 0.7  # the cosine as ``GRAZING`` from which there is all of the pressure
-# The distance beyond edges, in reference coordinates, over which the pressure ends where no other facet follows; without it a point
-# at a sharp edge would go on and off it.
+_FRONTAL = 0.7  # the cosine, defined as for ``GRAZING``, from which the full pressure acts
+# The distance beyond an edge, in reference coordinates, over which the pressure fades where no other facet follows; without it, a
+# point at a sharp edge would alternate between contact and no contact.
 _WIDE = 0.1
-# Beyond an edge, in radii of the facet at rest: the depth at which its pressure ends, and the distance within which another place
-# takes a share of it.
+# Beyond an edge, in radii of the facet at rest: the depth at which the pressure vanishes, and the distance within which another
+# point on a facet takes a share of the pressure.
 _SHALLOW, _NEAR = 0.25, 0.4
-_STAYS = 4.0  # beyond edges, the facet of the last search is taken unless another has this times its pressure
-_ON = 1e-7  # a place is on a facet up to this distance beyond its edges, in reference coordinates
-_AT = 0.02  # the same for the place nearest to a point
-_BENT = 3.0  # the height up to which a facet can face a point inside, in bulges of the facet; 2.1 if it is bent by 45 degrees
-_SAME = 1e-6  # crossings of a line are the same up to this distance [mm]
-# A point is in contact with this share of its pressure, or up to this times the depth under its pressure beyond the smoothing.
+_STAYS = 4.0  # beyond edges, a point stays on its last facet unless another has this many times the pressure
+_ON = 1e-7  # a line meets a facet up to this distance beyond the facet's edges, in reference coordinates
+_AT = 0.02  # the same for the point of a facet that is nearest to a point
+_BENT = 3.0  # the height, in bulges of a facet, up to which it can face a point inside; 2.1 for a bend of 45 degrees
+_SAME = 1e-6  # two crossings of a line are the same up to this distance [mm]
+# A point is in contact if it has at least this fraction of its pressure, or if its depth beyond the smoothing is at most this many
+# times the depth that belongs to its pressure.
 _HALF, _YIELDS = 0.5, 2.0
 
 
@@ -36,21 +38,21 @@ def _step(x: Floats) -> tuple[Floats, Floats]:
 
 
 def facing(here: FacetPlaces, there: FacetPlaces) -> tuple[Floats, Floats]:
-    """The share (n,) of the pressure by the cosine between the normals of places that face each other, and its derivative."""
+    """The fraction (n,) of the pressure that acts at this cosine between the normals of facing points, and its derivative."""
     share, slope = _step((-np.vecdot(here.normal, there.normal) - GRAZING) / (_FRONTAL - GRAZING))
     return share, slope / (_FRONTAL - GRAZING)
 
 
 def _close(apart: Floats, near: Floats) -> tuple[Floats, Floats]:
-    """The closeness (n,) of places ``apart`` along a line, 0 from ``near`` [mm], and its derivative."""
+    """The closeness (n,) of two crossings ``apart`` (n,) [mm] on a line, 0 at a distance of ``near`` [mm], and its derivative."""
     share, slope = _step(1 - np.abs(apart) / near)
     return share, -slope / near * np.sign(apart)
 
 
 @dataclass(frozen=True, eq=False)
 class Shades:
-    """Places on ``facets`` (k,) at gaps (k,) [mm] that take a share of the pressure from the hits ``of`` (k,), which are beyond
-    edges, within a distance ``near`` (k,) [mm].
+    """Points ``there`` on ``facets`` (k,), with gaps ``gap`` (k,) [mm], that take a share of the pressure from the hits ``of``
+    (k,), which are beyond edges. They do so within a distance ``near`` (k,) [mm].
     """
 
     of: Ints
@@ -62,8 +64,8 @@ class Shades:
 
 @dataclass(frozen=True, eq=False)
 class Hits(Met):
-    """Places that lines along normals hit; a point has at most one on a facet and one beyond an edge, which has the ``left`` (n,)
-    share of its pressure, according to the ``shades``.
+    """Points where lines along normals hit facets. A point has at most one hit on a facet and one beyond an edge. ``left`` (n,):
+    the fraction of its pressure that the ``shades`` leave to a hit beyond an edge.
     """
 
     left: Floats
@@ -72,9 +74,13 @@ class Hits(Met):
 
 @dataclass(frozen=True, eq=False)
 class Changes:
-    """The nine quantities of n hits, with derivatives ``rows`` (n, 9, a): x - y (3), the own slopes along the own normal (2), and
-    the other slopes along the other normal (2) and along the own one (2). By these, the changes of the own normal ``turn``
-    (n, 3, 9), the place ``slid`` (n, 2, 9), the gap ``opened`` (n, 9) and the cosine between the normals (n, 9).
+    """The first-order changes of n hits, expressed by nine quantities.
+
+    The quantities are x - y (3), the tangents of the point's facet along the point's normal (2), and the tangents of the other
+    facet along the other normal (2) and along the point's normal (2). ``rows`` (n, 9, a): the derivatives of the quantities with
+    respect to the unknowns. Derivatives with respect to the quantities: ``turn`` (n, 3, 9) of the point's normal, ``slid``
+    (n, 2, 9) of the hit's reference coordinates, ``opened`` (n, 9) of the gap, and ``cosine`` (n, 9) of the cosine between the
+    normals.
     """
 
     rows: Floats
@@ -85,7 +91,7 @@ class Changes:
 
 
 def changes(here: FacetPlaces, there: FacetPlaces, gap: Floats) -> Changes:
-    """The first-order changes of hits, from ``y = x + g n``."""
+    """The first-order changes of hits, derived from ``y = x + g n``."""
     n, other = here.normal, there.normal
     count, k = here.basis.shape
     rows = np.zeros((count, 9, k + there.basis.shape[1], 3))
@@ -107,13 +113,14 @@ def changes(here: FacetPlaces, there: FacetPlaces, gap: Floats) -> Changes:
 
 
 class RayPass(Pass):
-    """Points of one side whose own normals meet facets of the other."""
+    """Points of one side whose normals meet facets of the other side."""
 
-    degree = 14  # 42 points on a facet, not 16: one that leaves a sharp margin takes less force with it
+    degree = 14  # 42 points on a facet instead of 16, so that a point leaving a sharp margin takes less force with it
 
     def met(self, unknowns: Floats, most: float, last: Met | None = None, _: Settled | None = None) -> Hits:
-        """The hits of lines along the points' normals at gaps up to ``most`` [mm] along these, as deep as in ``Pass.met``. The
-        first crossing behind a point, and in front of it, decides: if it faces away, the point is not inside, or not outside.
+        """The hits of lines along the points' normals, at gaps up to ``most`` [mm] along the lines and to the depth of
+        ``Pass.met``. On either side of a point the first crossing decides: if its facet faces away, the point is not inside (for a
+        crossing behind the point) or not outside (for a crossing in front of it).
         """
         nodes = self.other.nodes(unknowns)
         some, facets, here = self._lines(unknowns, nodes, most)
@@ -121,7 +128,7 @@ class RayPass(Pass):
         beyond, share = self.other.beyond(there.at), facing(here, there)[0]
         felt = (gap < most) & (gap > -self._reach(nodes)[facets]) & (share > 0)
         on = np.flatnonzero(beyond <= _ON)
-        far = np.abs(gap) - _ON * share  # at a common edge, the facet that faces the point
+        far = np.abs(gap) - _ON * share  # at a common edge, prefers the facet that faces the point
         first = on[_first(2 * some[on] + (gap[on] < 0), far[on])]
         hits = first[felt[first]]
         hits = hits[_first(some[hits], far[hits])]
@@ -148,7 +155,7 @@ class RayPass(Pass):
         return Hits(points, own, here[found], facets[found], there[found], gap[found], left[found], shades)
 
     def _hidden(self, nodes: Floats, here: FacetPlaces, gap: Floats) -> Ints:
-        """The hits (k,) that lie behind a nearer crossing of a facet that is out of reach, which ``_lines`` leaves out."""
+        """The hits (k,) that lie behind a nearer crossing of a facet out of reach; ``_lines`` leaves such crossings out."""
         reach = self._reach(nodes)
         deep = np.flatnonzero(-gap > reach.min())
         if not len(deep):
@@ -161,7 +168,7 @@ class RayPass(Pass):
         return np.unique(some[between])
 
     def _lines(self, unknowns: Floats, nodes: Floats, most: float) -> tuple[Ints, Ints, FacetPlaces]:
-        """Pairs of points and facets (p,) that lines along normals may hit, and the points' places on their own facets."""
+        """Pairs of points (p,) and facets (p,) that lines along normals may hit, and the points' positions on their own facets."""
         points, (middles, radii) = self.places(unknowns), self.other.balls(nodes)
         reach = np.maximum(self._reach(nodes), most)
         some, facets = self._near(points, (middles, radii), radii + reach, 0 * points[:, 0], nodes)
@@ -171,12 +178,12 @@ class RayPass(Pass):
         here = self._here(self.side.nodes(unknowns), some)
         away = middles[facets] - here.point
         kept = np.vecdot(away, away) - np.vecdot(away, here.normal) ** 2 <= radii[facets] ** 2
-        # Only points that can have contact. A bent facet may face a point that is above its middle plane, by more than its bulge.
+        # Keep only points that can have contact. A bent facet may face a point above its middle plane by more than its bulge.
         kept &= np.isin(some, some[kept & (height < most + _BENT * bulge[facets])])
         return some[kept], facets[kept], here[np.flatnonzero(kept)]
 
     def _ends(self, at: Floats, gap: Floats, facets: Ints) -> tuple[Floats, Floats, Floats]:
-        """The share (n,) of the pressure beyond edges, and its derivatives by the place (n, 2) and the gap (n,)."""
+        """The fraction (n,) of the pressure that acts beyond edges, its derivatives by coordinates (n, 2) and by the gap (n,)."""
         size, (beyond, leaving) = _SHALLOW * self.other.balls(self.other.rest)[1][facets], self.other.leaving(at)
         (wide, by_place), (shallow, by_gap) = _step(1 - beyond / _WIDE), _step(2 + 2 * gap / size)
         out = beyond > _ON
@@ -184,17 +191,17 @@ class RayPass(Pass):
         return wide * shallow, -(by_place * shallow / _WIDE)[:, None] * leaving, wide * by_gap
 
     def shares(self, met: Met) -> Floats:
-        """The shares (n,) of the pressure that hits have."""
+        """The fractions (n,) of the full pressure that act on hits."""
         assert isinstance(met, Hits)  # found by ``met``
         return met.left * facing(met.here, met.there)[0] * self._ends(met.there.at, met.gap, met.facets)[0]
 
     def depth(self, met: Met) -> float:
-        """The greatest depth [mm] of points on facets, normal to these."""
+        """The maximum depth [mm] of points on facets, normal to the facets."""
         cosine, on = -np.vecdot(met.here.normal, met.there.normal), self.other.beyond(met.there.at) <= _ON
         return float((-met.gap * cosine)[on].max(initial=0.0))
 
     def pressed(self, met: Met) -> PressedPoints:
-        """The contact of hits: the force of the pressure along the own normal."""
+        """The contact of hits; the pressure acts along the normal of the point."""
         assert isinstance(met, Hits)  # found by ``met``
         by, n = changes(met.here, met.there, met.gap), met.here.normal
         whole, slope = self.whole(met)
@@ -212,7 +219,7 @@ class RayPass(Pass):
         return PressedPoints(self._dofs(met), by.rows, pull, areas[:, None, None] * second, pull[:, :3])
 
     def shaded(self, met: Hits) -> PressedPoints:
-        """The change of forces beyond edges with the places that take a share of them: a tangent without forces."""
+        """The change of the forces beyond edges when their shades move: a tangent without forces."""
         of, shades = met.shades.of, met.shades
         here, there = met.here[of], met.there[of]
         hit, shade = changes(here, there, met.gap[of]), changes(here, shades.there, shades.gap)
@@ -231,9 +238,11 @@ class RayPass(Pass):
         return PressedPoints(dofs, rows, np.zeros((len(of), 4)), second, np.zeros((len(of), 3)))
 
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
-        """The points (k,) that went through, as in ``Pass``. Points that ``met`` the other side are in contact if they have at
-        least half of their pressure; others, and points that ``Pass`` would meet, only to a depth that fits their pressure. Points
-        that end in front of the nearest place and face it are not lost: they slid round an edge.
+        """The points (k,) that went through the other side, as in ``Pass.through``.
+
+        Points that ``met`` the other side are in contact if they have at least half of their pressure. All other points, and points
+        that ``Pass`` would meet, are in contact only to a depth that fits their pressure. Points that end in front of the nearest
+        facet and face it are not lost: they slid round an edge.
         """
         deep = np.full(len(self.areas), self.law.smoothing)
         np.maximum.at(deep, met.points, self.law.smoothing + _YIELDS / self.law.stiffness * self.pressure(met)[0])
@@ -252,13 +261,15 @@ class RayPass(Pass):
 
 
 def _first(keys: Ints, values: Floats) -> Ints:
-    """The positions (k,) of the least of the ``values`` (n,) with each of the ``keys`` (n,)."""
+    """The indices (k,) of the smallest of the ``values`` (n,) for each of the different ``keys`` (n,)."""
     order = np.lexsort((values, keys))
     return np.asarray(order[np.unique(keys[order], return_index=True)[1]])
 
 
 def _of_same(points: Ints, one: Ints, other: Ints) -> list[tuple[Ints, Ints]]:
-    """Pairs of members of ``one`` (n,) and ``other`` (m,), numbers among ``points``, of the same point, in lists."""
+    """Pairs of entries of ``one`` (n,) and ``other`` (m,), which are indices into ``points``, that belong to the same point. The
+    list has one item for the first partners of the entries of ``one``, one for the second partners, and so on.
+    """
     other = other[np.argsort(points[other], kind="stable")]
     low, high = (np.searchsorted(points[other], points[one], side) for side in ("left", "right"))
     has = [np.flatnonzero(low + i < high) for i in range(int((high - low).max(initial=0)))]

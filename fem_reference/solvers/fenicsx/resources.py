@@ -1,4 +1,4 @@
-"""Unknowns and memory of a solution; free memory and idle cores of the machine. Needs no FEniCSx."""
+"""Unknowns and memory of a solution, and free memory and idle cores of the machine. This module does not need FEniCSx."""
 
 import os
 import time
@@ -16,9 +16,9 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 SMALL = 4000
 # From this number of unknowns on, multigrid is faster than one factorisation per frame.
 LARGE = 350_000
-# Memory [MB] of a process without a body, of each unknown besides its factors, of each unknown in total with multigrid, and of the
-# factors of 16 000 unknowns in double precision; and the power with which factors grow. Measured on gluteus_maximus from 16 000 to
-# 560 000 unknowns. MUMPS allocates more than it uses.
+# Memory [MB] of a process without a body, for each unknown in addition to the factors, for each unknown in total with multigrid,
+# and of the factors for 16 000 unknowns in double precision; and the exponent with which the factors grow. Measured on
+# gluteus_maximus from 16 000 to 560 000 unknowns. MUMPS allocates more than it uses.
 _EMPTY, _EACH, _EACH_MULTIGRID, _FACTORS, _POWER = 250.0, 6.5e-3, 1e-2, 60.0, 1.38
 # The maximum size [bytes] of the states of all frames that a run stores by default.
 MOST_STATES = 2**26
@@ -43,7 +43,7 @@ def unknowns(cells: Cells, element: str) -> int:
 
 
 def state(cells: Cells, element: str, *, steps: bool) -> int:
-    """The size [bytes] of the state of ``cells`` at a frame; with ``steps`` also of the start of its last load step."""
+    """The size [bytes] of the state of ``cells`` at a frame; with ``steps`` it includes the start of the last load step."""
     kind, degree, pressure = ELEMENTS[element]
     nodes, corners = (len(reference_nodes(kind, order)) for order in (degree, 1))
     pressures = {None: 0, 0: 1, 1: corners}[pressure]
@@ -59,7 +59,7 @@ def memory(count: int, solver: str, precision: str) -> float:
 
 
 def available() -> float:
-    """The free memory [MB] that the system reports; infinite where it reports none."""
+    """The free memory [MB] that the system reports; infinite if it does not report any."""
     try:
         lines = Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
         return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("MemAvailable"))
@@ -68,7 +68,9 @@ def available() -> float:
 
 
 def planned[S: BodySettings](settings: S, cells: Cells, free: float) -> S:
-    """Settings with linear solver and precision, as requested or as size and ``free`` [MB] allow; InputError if none fits."""
+    """The settings with linear solver and precision, as requested or as size and ``free`` memory [MB] allow. Raises InputError if
+    no solver fits into the memory.
+    """
     count = unknowns(cells, settings.element)
     for kind in [settings.linear_solver] if settings.linear_solver else _fitting(settings.element, count):
         precision = settings.precision or ("double" if kind == "direct" else "single")
@@ -88,7 +90,7 @@ def _fitting(element: str, count: int) -> list[Literal["direct", "lagged", "mult
 
 
 def idle_cores() -> int:
-    """The number of idle cores among those that this process may use; all of them where the system does not report their load."""
+    """The number of idle cores among those that this process may use; all of them if the system does not report their load."""
     mine = os.sched_getaffinity(0)
     try:
         before, begin = _idle(mine), time.perf_counter()
@@ -106,6 +108,6 @@ def _idle(cores: set[int]) -> float:
 
 
 def ranks(settings: BodySettings, count: int) -> int:
-    """The number of ranks for a solution of ``count`` unknowns: two where that is faster and a core is free for each."""
+    """The number of ranks for a solution of ``count`` unknowns: two if that is faster and two cores are idle, otherwise one."""
     worth = settings.linear_solver != "multigrid" and count >= _WORTH_RANKS
     return 2 if worth and idle_cores() >= 2 else 1

@@ -13,7 +13,7 @@ from fem_reference.effects.neo_hooke import NeoHooke
 
 
 class RestStress:
-    """Stress from the ``response`` (like ``unknowns``) of an isotropic body to the effects at rest; see ``effects.in_situ``."""
+    """The stress due to the ``response`` of an isotropic body to the effects at rest; see ``effects.in_situ``."""
 
     def __init__(self, unknowns: fem.Function, effects: tuple[Effect, ...]) -> None:
         self.response = fem.Function(unknowns.function_space)
@@ -34,5 +34,5 @@ class RestStress:
 
 
 def rest_stress(unknowns: fem.Function, effects: tuple[Effect, ...]) -> RestStress | None:
-    """The stress at rest of a body with ``effects``, None if it is not in situ."""
+    """The stress at rest of a body with ``effects``; None if the body is not in situ."""
     return None if among(effects) is None else RestStress(unknowns, effects)

@@ -15,7 +15,7 @@ from fem_reference.solvers.fenicsx.jobs import Kept
 
 
 class Restart:
-    """Writes and reads the states of a ``body``; collective. The number of ranks may differ when they are read."""
+    """Writes and reads the states of a ``body``; collective. The numbers of ranks that write and read may differ."""
 
     def __init__(self, body: AssembledBody, kept: Kept) -> None:
         self.body, self.kept = body, kept
@@ -44,13 +44,13 @@ class Restart:
 
     @property
     def _acting(self) -> str:
-        """The effects and the contact law, in words."""
+        """The effects and the contact law, as text."""
         contact = self.body.contact
         law = "no contact" if contact is None else f"contact {contact.law.stiffness:g} {contact.law.smoothing:g}"
         return " ".join([*map(repr, self.body.effects), law])
 
     def write(self, frame: float, facts: dict[str, Any]) -> None:
-        """Store the present state, at ``frame``, with the facts on the run so far."""
+        """Store the current state, at ``frame``, with ``facts`` about the run so far."""
         body = self.body
         arrays = {"unknowns": body.unknowns.x.array} | body.clock.arrays()
         stored: dict[str, Any] = {name: self._gathered(values) for name, values in arrays.items()}
@@ -61,8 +61,9 @@ class Restart:
             write_arrays(self.kept.place(frame), stored)
 
     def good(self) -> tuple[int, ...]:
-        """The frames of the states to continue from: all of them; if other effects acted then, only frames before the first that is
-        no longer in equilibrium, and none if rates matter. The body is restored afterwards.
+        """The frames from whose states the run can continue. These are all frames, unless other effects acted when they were
+        stored: then they are the frames before the first that is no longer in equilibrium, or none if rates matter. The body is
+        restored afterwards.
         """
         body, found = self.body, list[int]()
         rest, at = np.array(body.unknowns.x.array), body.at
@@ -82,7 +83,7 @@ class Restart:
         return tuple(found)
 
     def _read(self, frame: int) -> tuple[dict[str, Floats], dict[str, Any]]:
-        """The arrays of this rank for a state, and its facts."""
+        """This rank's arrays of a stored state, and the facts stored with it."""
         arrays = read_arrays(self.kept.place(frame))
         facts = json.loads(str(arrays.pop("facts")))
         mine = {name: np.zeros(len(self.body.unknowns.x.array)) for name in arrays}
@@ -91,7 +92,7 @@ class Restart:
         return mine, facts
 
     def go_on(self, frames: tuple[int, ...]) -> dict[str, Any]:
-        """Restore the state of the last of the ``frames`` and register the others; returns the facts stored with it."""
+        """Restore the state of the last of the ``frames``, register the earlier ones, and return the facts of the last state."""
         body, facts = self.body, dict[str, Any]()
         for frame in frames:
             arrays, facts = self._read(frame)

@@ -1,6 +1,7 @@
-"""Friction between parts of a surface: points of one side stick to places on the facets of the other, or slide along these.
+"""Friction between parts of a surface: a point of one side sticks to an anchor on a facet of the other, or slides along the facet.
 
-Slip is measured in coordinates of a facet, which move with it: a rigid motion causes no slip, so forces and moments balance.
+Slip is measured in reference coordinates of a facet, which move with the facet. A rigid motion therefore causes no slip, and forces
+and moments balance.
 """
 
 from dataclasses import dataclass
@@ -19,10 +20,13 @@ _THIRD = np.array([[[6, 7], [7, 8]], [[7, 8], [8, 9]]])
 
 @dataclass(frozen=True, eq=False)
 class Rubbed:
-    """Friction of n points. Twelve quantities depend on the unknowns ``dofs`` (n, a) with derivatives ``rows`` (n, 12, a): x - y
-    (3), both slopes of the facet (3 each), and its second slopes along the normal (3). ``pull`` (n, 12) [N]: the forces along
-    these; ``second`` (n, 12, 12): their derivative, with the sign of an energy's Hessian. ``held`` (n, 2): the places that hold the
-    points, in coordinates of their present facets; ``lost`` (n,) [N mm]: the work; ``far`` (n,): the distance slid beyond a facet.
+    """Friction of n points, expressed by twelve quantities: x - y (3), both tangents of the facet (3 each), and the second
+    derivatives of the facet along its normal (3).
+
+    ``rows`` (n, 12, a): the derivatives of the quantities with respect to the unknowns ``dofs`` (n, a); ``pull`` (n, 12) [N]: the
+    forces that belong to the quantities; ``second`` (n, 12, 12): the derivatives of the forces, with the sign of an energy's
+    Hessian. ``held`` (n, 2): the anchors, in coordinates of the points' current facets; ``lost`` (n,) [N mm]: the work;
+    ``far`` (n,): the distance slid beyond a facet.
     """
 
     dofs: Ints
@@ -36,8 +40,9 @@ class Rubbed:
 
 @dataclass(frozen=True, eq=False)
 class Sliding:
-    """The coordinates of n points on their facets: their first derivatives ``A`` (n, 2, 12) with respect to the twelve quantities
-    of ``Rubbed`` and second ones ``Q`` (n, 2, 12, 12), and the ``metric`` (n, 2, 2) with its derivative ``turn`` (n, 2, 2, 12).
+    """The coordinates of n points on their facets: the first derivatives ``A`` (n, 2, 12) and the second derivatives ``Q``
+    (n, 2, 12, 12) with respect to the twelve quantities of ``Rubbed``; and the ``metric`` (n, 2, 2) with its derivative ``turn``
+    (n, 2, 2, 12).
     """
 
     A: Floats
@@ -47,11 +52,11 @@ class Sliding:
 
 
 def slip(there: FacetPlaces, gap: Floats, second: Floats, third: Floats) -> Sliding:
-    """The derivatives of the coordinates of the place nearest to a point at a ``gap`` g (n,) [mm], from ``y' (x - y) = 0``.
+    """The derivatives of the coordinates of the facet point nearest to a point at a ``gap`` g (n,) [mm], from ``y' (x - y) = 0``.
 
-    With slopes y', metric a and second slopes b along the normal of the facet, ``R = x - y = g n`` and ``m = a - g b``: the first
-    is ``m^-1 (y' (dx - dy) + R dy')``, and the second is m^-1 times the second derivative of the condition along the first.
-    ``second`` and ``third``: derivatives of the position [mm].
+    The facet has tangents y', metric a and second derivatives b along its normal; let ``R = x - y = g n`` and ``m = a - g b``. The
+    first derivative is then ``m^-1 (y' (dx - dy) + R dy')``, and the second is m^-1 times the second derivative of the condition
+    along the first. ``second`` and ``third``: derivatives of the position [mm].
     """
     count, y, R = len(gap), there.tangents, gap[:, None] * there.normal
     inverse = np.linalg.inv(there.metric - gap[:, None, None] * there.bend)
@@ -84,9 +89,9 @@ def slip(there: FacetPlaces, gap: Floats, second: Floats, third: Floats) -> Slid
 
 
 class Rubbing:
-    """Friction of the points of one pass by its law. ``facets`` (n,) and ``at`` (n, 2): the places on the other side that hold the
-    points, with facet -1 where none does; ``settled`` (u,): the unknowns from which slip is counted. Friction ``acts`` once no
-    overlap at rest is left.
+    """Friction of the points of one pass, by the law of the pass. ``facets`` (n,) and ``at`` (n, 2): the anchors of the points on
+    the other side; the facet is -1 for a point without an anchor. ``settled`` (u,): the unknowns from which slip is counted.
+    Friction ``acts`` once no overlap at rest remains to be removed.
     """
 
     acts = False
@@ -96,13 +101,13 @@ class Rubbing:
         self.facets, self.at, self.settled = np.full(len(one.areas), -1), np.zeros((len(one.areas), 2)), np.zeros(count)
 
     def settle(self, met: Met, held: Floats, unknowns: Floats) -> None:
-        """Hold only the points that ``met`` facets, at the places ``held`` (k, 2) on these, until the next call."""
+        """Hold only the points that ``met`` facets, at the anchors ``held`` (k, 2) on these facets, until the next call."""
         self.acts = self.law.relaxed is None or self.one.share == 0
         self.facets[:] = -1
         self.facets[met.points], self.at[met.points], self.settled = met.facets, held, np.array(unknowns)
 
     def rubbed(self, met: Met, unknowns: Floats) -> Rubbed:
-        """Friction of points that ``met`` facets: ``-min(k |e|, friction p) e / |e|``, e the elastic slip in the present metric."""
+        """Friction of points that ``met`` facets: ``-min(k |e|, friction p) e / |e|``, e the elastic slip in the current metric."""
         tables = self.other.element.tabulate(3, met.there.at)[..., 0]
         place, whole, elastic, change = self._slipped(met, unknowns, tables)
         covector = np.einsum("nab,nb->na", place.metric, elastic)
@@ -134,8 +139,8 @@ class Rubbing:
         )
 
     def _slipped(self, met: Met, unknowns: Floats, tables: Floats) -> tuple[Sliding, Floats, Floats, Floats]:
-        """The derivatives of the places on the facets; their whole displacement (n, 2) since the settled state, the part (n, 2) of
-        it that counts as elastic slip, and its derivative (n, 2, 12). ``tables``: of the facets' basis functions.
+        """The derivatives of the facet coordinates, their total change (n, 2) since the settled state, the part (n, 2) of this
+        change that counts as elastic slip, and the derivative (n, 2, 12) of this part. ``tables``: of the facets' basis functions.
         """
         every = np.einsum("dnk,nki->dni", tables, self.other.nodes(unknowns)[met.facets])
         place = slip(
@@ -147,8 +152,8 @@ class Rubbing:
         return place, whole, share[:, None] * whole, change
 
     def _starts(self, met: Met) -> tuple[Floats, Floats, Floats]:
-        """The coordinates (n, 2) on the facets from which the points slip, the fraction (n,) of the path from there that counts as
-        slip, and its derivative (n,) in the gap. A point new in contact slips from where its path comes within the smoothing.
+        """The facet coordinates (n, 2) from which the points slip, the fraction (n,) of the path from there that counts as slip,
+        and the derivative (n,) of the fraction by the gap. A point new in contact slips from where its path enters the smoothing.
         """
         at, share, by_gap = self.at[met.points], np.ones(len(met.gap)), np.zeros(len(met.gap))
         moved = np.flatnonzero(self.facets[met.points] != met.facets)
@@ -165,7 +170,7 @@ class Rubbing:
         return at, share, by_gap
 
     def _rows(self, met: Met, tables: Floats) -> tuple[Ints, Floats]:
-        """The unknowns (n, a) of the points and places, and the ``rows`` (n, 12, a) of ``Rubbed``."""
+        """The unknowns (n, a) of the points and of the facets that they met, and the ``rows`` (n, 12, a) of ``Rubbed``."""
         own, others = met.here.basis, tables[[0, 1, 2, 3, 4, 5]].transpose(1, 0, 2)
         none, count = np.zeros((len(own), 6, own.shape[1])), len(own)
         by = np.concatenate([none, others], axis=2)

@@ -21,7 +21,7 @@ from fem_reference.solvers.fenicsx.settings import BodySettings, FieldSettings
 
 
 class Session:
-    """Solves problems in a subprocess with ``ranks``, restarted if it died; jobs and frames are passed as files in a ``folder``."""
+    """Solves problems in a subprocess on ``ranks``, restarted if it died; jobs and frames are passed as files in a ``folder``."""
 
     def __init__(self, folder: Path, ranks: int) -> None:
         self.folder, self.ranks = folder.resolve(), ranks  # the process may have another working directory
@@ -29,13 +29,13 @@ class Session:
         self.closed = False
 
     def solve(self, body: Body, settings: BodySettings) -> Run:
-        """The run of ``body``, in memory."""
+        """Solve for ``body`` and return the run, in memory."""
         frames: list[Frame] = []
         outcome = self.follow(body, settings, frames.append)
         return replace(collected(frames, outcome), solver="fenicsx", body=body, settings=settings)
 
     def follow(self, body: Body, settings: BodySettings, sink: Sink) -> Outcome:
-        """Solve for ``body`` and pass its frames to ``sink``; InputError if element, ranks or linear solver do not suit it."""
+        """Solve for ``body`` and pass its frames to ``sink``. Raises InputError if element, ranks or solver do not suit it."""
         check(body, settings.element, settings.quadrature_degree)
         if body.touching and self.ranks > 1:
             raise InputError("ranks", self.ranks, "1, as only then parts of the surface may touch")
@@ -46,7 +46,7 @@ class Session:
 
     def run(self, job: Job | FieldProblem, time_limit: float | None, sink: Sink) -> Outcome:
         """Solve the ``job`` and pass each frame to ``sink``. No exception is raised if the process dies (status *crashed*) or is
-        ended at the time limit (*timed out* or *stalled*). RuntimeError once the session is closed.
+        ended at the time limit (*timed out* or *stalled*). Raises RuntimeError if the session is closed.
         """
         if self.closed:
             raise RuntimeError("the session is closed")
@@ -58,7 +58,7 @@ class Session:
             outcome = process.solve(path, time_limit, sink)
             lasts = process.overran is None and outcome.status != "crashed"
         finally:
-            if not lasts:  # later reports on this job must not reach the next
+            if not lasts:  # late reports on this job must not reach the next job
                 self.process = None
                 process.end()
         return outcome
@@ -66,7 +66,7 @@ class Session:
 
 @contextmanager
 def session(ranks: int = 1) -> Iterator[Session]:
-    """A context with a session, whose process ends with it. MissingSoftware where FEniCSx is not installed."""
+    """A context with a session, whose process ends with the context. Raises MissingSoftware if FEniCSx is not installed."""
     require_installed()
     with scratch_folder() as folder:
         own = Session(folder, ranks)
@@ -85,9 +85,9 @@ _shared: ContextVar[Session | None] = ContextVar("shared", default=None)
 
 @contextmanager
 def shared(own: Session | None = None) -> Iterator[None]:
-    """A context in which all problems on one rank are solved in one process, which reuses loaded and compiled code; a process that
-    is already shared remains in use. Or, on as many ranks as it has, in that of the session ``own``. Without FEniCSx nothing is
-    shared.
+    """A context in which one process solves all problems on one rank, and reuses loaded and compiled code. A process that is
+    already shared remains in use. With a session ``own``, its process solves all problems on as many ranks as the session has.
+    Without FEniCSx nothing is shared.
     """
     used = own or _shared.get()
     with session() if used is None and installed() else nullcontext(used) as common:
@@ -99,7 +99,7 @@ def shared(own: Session | None = None) -> Iterator[None]:
 
 
 def opened(ranks: int = 1) -> AbstractContextManager[Session]:
-    """The shared session if it has as many ``ranks``; else a new one. MissingSoftware where FEniCSx is not installed."""
+    """The shared session if it has this number of ``ranks``, otherwise a new one. Raises MissingSoftware without FEniCSx."""
     common = _shared.get()
     if common is None or common.ranks != ranks:
         return session(ranks)
@@ -120,7 +120,7 @@ def solve_body(body: Body, settings: BodySettings) -> Run:
 
 
 def solve_scalar(problem: FieldProblem, settings: FieldSettings, sink: Sink) -> Outcome:
-    """Solve for a scalar field, in the shared session or in a new one, and pass it to ``sink``; NaN if the process died."""
+    """Solve for a scalar field, in the shared session or a new one, and pass it (NaN if the process died) to ``sink``."""
     frames: list[Frame] = []
     with opened() as solver:
         outcome = solver.run(problem, settings.time_limit, frames.append)

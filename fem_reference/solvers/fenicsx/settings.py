@@ -11,17 +11,20 @@ from fem_reference.solvers.common.protocol import Trade
 
 
 class BodySettings(Record):
-    """Numerical settings for a body; load steps are in frame numbers.
+    """Numerical settings for a body. The sizes of load steps are differences of frame numbers.
 
-    ``element``: one of ``body.ELEMENTS``. The load step begins with ``first_step``. It grows by half after an easy step (at most 5
+    ``element``: one of ``body.ELEMENTS``. ``first_step``: the first load step. The step grows by half after an easy step (at most 5
     Newton iterations), up to ``largest_step`` if given, and is halved, down to ``smallest_step``, if Newton's method needs more
     than ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal forces and
     of the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are integrated exactly
-    on a straight cell, by default as the element requires. ``linear_solver``: ``"direct"``, a factorisation of each system;
-    ``"lagged"``, inexact FGMRES, preconditioned with a factorisation that is kept until a new one is cheaper (before a run ends
-    ``out of steps``, it is continued with exact solutions); ``"multigrid"``, FGMRES with two levels of elements; the default
-    depends on the size. ``precision`` of factorisations: by default double if direct and single if lagged. Both settings change the
-    time but not the result. ``follow``: ``"equilibrium"``, any that Newton's method finds, or ``"stable"``: if the equilibrium of a
+    on a straight cell; the default depends on the element.
+
+    ``linear_solver``: ``"direct"`` factorises each system. ``"lagged"`` uses inexact FGMRES, preconditioned with a factorisation
+    that is reused until a new one is cheaper; before a run ends ``out of steps``, it is continued with exact solutions.
+    ``"multigrid"`` uses FGMRES with two levels of elements. The default depends on the size. ``precision``: the precision of
+    factorisations, by default double for ``"direct"`` and single for ``"lagged"``. Both settings change the time, not the result.
+
+    ``follow``: ``"equilibrium"`` accepts any equilibrium that Newton's method finds. With ``"stable"``, if the equilibrium of a
     frame is unstable (and negative modes are counted), the body is moved along its lowest mode by a ``perturbation``, a fraction of
     its size, and the frame is solved again; the move is reversed and enlarged, up to eight times, until fewer modes are negative.
     ``reuse``: reuse the state of an earlier frame with the same load. ``time_limit``: the limit on processor time for each rank, by
@@ -47,7 +50,7 @@ class BodySettings(Record):
 
 
 class Settings(BodySettings):
-    """Numerical settings for a muscle. ``ranks``: MPI processes, by default 1, or 2 if this is faster and cores are free."""
+    """Numerical settings for a muscle. ``ranks``: the number of MPI processes, by default 1, or 2 if faster and cores are free."""
 
     ranks: int | None = Field(default=None, gt=0, le=1024)
 

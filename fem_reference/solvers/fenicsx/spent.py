@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 
 class Spent:
-    """``seconds`` of this process by phase, and ``counts`` by name. Time in a phase within another counts for the inner one."""
+    """``seconds`` of this process by phase, and ``counts`` by name. Time in a nested phase counts for the inner phase only."""
 
     def __init__(self) -> None:
         self.seconds: defaultdict[str, float] = defaultdict(float)

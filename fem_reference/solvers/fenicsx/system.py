@@ -1,6 +1,6 @@
 """The equations of a body in equilibrium: residual and tangent, summed from cells, springs, loads and contact.
 
-Every method is collective: all ranks call it.
+Every method is collective: all ranks must call it.
 """
 
 from typing import Any
@@ -28,7 +28,7 @@ _ROUNDING = 1e-11  # [mm], the rounding of positions
 
 class System:
     """Residual ``b`` and tangent ``matrix`` of the ``unknowns``. Prescribed unknowns are eliminated: their residual is 0, and their
-    row and column of the tangent have only a 1 on the diagonal.
+    rows and columns of the tangent are 0 except for a 1 on the diagonal.
     """
 
     def __init__(self, form: Form, conditions: list[PrescribedRegion | PointSprings], spent: Spent) -> None:
@@ -40,7 +40,7 @@ class System:
         for one in conditions:
             self.fixed[one.exact] = True
         self.cells = CellSums(form)
-        self.scale = np.ones(self.size)  # the unit of each unknown in linear systems
+        self.scale = np.ones(self.size)  # of each unknown in linear systems
         self.b, self.work = create_vector(space), la.vector(self.index_map, self.block)
         self.ties = [one for one in conditions if isinstance(one, PointSprings)]
         springs = sum((one.springs(form) for one in conditions if isinstance(one, PrescribedRegion)), 0)
@@ -57,7 +57,9 @@ class System:
         self._use(self.cells.structure(), 1.0)
 
     def _use(self, structure: Structure, unit: float) -> None:
-        """Give the tangent and the matrix the entries of a ``structure``; entries of ghost rows go to the ranks that own them."""
+        """Give the tangent and the matrix this ``structure`` and the pressures the scale ``unit``. Entries of ghost rows go to the
+        ranks that own the rows.
+        """
         blocks = self.index_map.local_to_global(np.arange(self.size // self.block, dtype=np.int32))
         names = (blocks[:, None] * self.block + np.arange(self.block)).ravel().astype(PETSc.IntType)
         rows = np.repeat(np.arange(self.size), np.diff(structure.starts))
@@ -66,16 +68,16 @@ class System:
         self.matrix.setPreallocationCOO(names[rows], names[structure.columns])
         diagonal = np.flatnonzero(structure.columns == rows)
         own = np.flatnonzero(self.fixed[: self.owned])
-        self.prescribed_diagonal = diagonal[own]  # every row has one, in the order of the rows
+        self.prescribed_diagonal = diagonal[own]  # every row has a diagonal entry, in the order of the rows
         for terms in self.surface:
             terms.find_places(self._keys())
 
     def _keys(self) -> Ints:
-        """The keys (e,) of the entries of the structure, ``row * size + column``, which are sorted."""
+        """The sorted keys (e,) of the entries of the structure: ``row * size + column``."""
         return np.repeat(np.arange(self.size), np.diff(self.structure.starts)) * self.size + self.structure.columns
 
     def _add_touching(self, touching: TouchingForces) -> None:
-        """Add the tangent of ``touching`` to the entries, after adding to the structure the entries that it lacks."""
+        """Add the tangent of ``touching`` to the entries, after extending the structure by the entries that it needs."""
         found, own = touching.tangent().tocoo(), self._keys()
         free = ~(self.fixed[found.row] | self.fixed[found.col])
         keys = found.row[free].astype(np.int64) * self.size + found.col[free]
@@ -91,7 +93,7 @@ class System:
         self.tangent.entries[places] += found.data[free]
 
     def residual(self, tractions: Tractions | None = None) -> float:
-        """Sum the residual into ``b`` and return its norm; ``tractions`` of contact, if given, replace the present ones."""
+        """Assemble the residual into ``b`` and return its norm. ``tractions``, if given, replace the current contact tractions."""
         with self.spent.on("assembly"):
             self.work.array[:] = 0
             self.cells.add(self.work.array)
@@ -100,8 +102,8 @@ class System:
     def linearise(
         self, moves: Floats | None = None, tractions: Tractions | None = None, *, pointwise: bool = False
     ) -> float:
-        """Sum the ``residual``, and the tangent into ``matrix``; the effect of ``moves`` (n,) of prescribed unknowns is added to
-        first order. ``pointwise``: see ``cells``.
+        """Assemble the ``residual``, and the tangent into ``matrix``. Changes ``moves`` (n,) of prescribed unknowns are taken into
+        account to first order. ``pointwise``: see ``CellSums.add``.
         """
         with self.spent.on("assembly"):
             self.work.array[:], self.tangent.entries[:] = 0, 0
@@ -118,7 +120,7 @@ class System:
             return self._finish(tractions, moves)
 
     def _finish(self, tractions: Tractions | None, moves: Floats | None) -> float:
-        """Add all terms except those of cells, and the parts of other ranks; return the norm of the residual."""
+        """Complete the residual with all terms except those of cells and with the parts of other ranks; return its norm."""
         for terms in self.surface:
             terms.add_residual(self.work.array, moves)
         for tie in self.ties:
@@ -134,8 +136,8 @@ class System:
         return norm
 
     def balance_units(self) -> None:
-        """Choose a unit of pressure from the present tangent: in linear systems it gives volumes [mm3] the weight of forces [N],
-        and pressures the weight of displacements [mm].
+        """Choose the scale of the pressure from the current tangent. In linear systems it gives volumes [mm3] the weight of forces
+        [N], and pressures the weight of displacements [mm].
         """
         space = self.unknowns.function_space
         if space.num_sub_spaces == 1:
@@ -165,8 +167,8 @@ class System:
         return bool(self.unknowns.function_space.mesh.comm.allreduce(most, MPI.MAX) > _ROUNDING)
 
     def reactions(self, *, inside: bool = False) -> Floats:
-        """The residual (n,), without springs over facets and prescribed values, on the ranks that own the unknowns; or, if
-        ``inside``, the residual of the effects inside the body alone.
+        """The residual (n,) on the ranks that own the unknowns, without springs over facets but also at prescribed unknowns. With
+        ``inside``, it is the residual of the effects inside the body alone.
         """
         self.work.array[:] = 0
         self.cells.add(self.work.array)
@@ -180,7 +182,7 @@ class System:
 
 
 class SurfaceSums:
-    """Terms of the weak form on parts of the surface, with their tangent in the entries of a structure."""
+    """Terms of the weak form on parts of the surface; their tangent is added to the entries of a structure."""
 
     def __init__(self, terms: Any, unknowns: fem.Function, fixed: NDArray[np.bool_]) -> None:
         step = ufl.TrialFunction(unknowns.function_space)
@@ -189,13 +191,13 @@ class SurfaceSums:
         self.fixed = fixed
 
     def find_places(self, keys: Ints) -> None:
-        """Find the places of the tangent among entries with the sorted ``keys`` (e,), each ``row * size + column``."""
+        """Find the indices of the tangent's entries in the sorted ``keys`` (e,), each ``row * size + column``."""
         rows, columns = np.repeat(np.arange(len(self.fixed)), np.diff(self.matrix.indptr)), self.matrix.indices
         self.places = np.searchsorted(keys, rows * len(self.fixed) + columns)
         self.places[self.fixed[rows] | self.fixed[columns]] = len(keys)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
-        """Add the terms to ``residual`` (n,), with their first-order change by ``moves`` (n,) of the unknowns."""
+        """Add the terms to ``residual`` (n,), and their first-order change due to changes ``moves`` (n,) of the unknowns."""
         fem.assemble_vector(residual, self.residual)
         if moves is not None:
             entries = (self.matrix.data, self.matrix.indices, self.matrix.indptr)
@@ -211,9 +213,11 @@ class SurfaceSums:
 def reactions(
     system: System, contact: ContactForces | None, *, divided: bool
 ) -> tuple[dict[str, Floats], dict[str, Floats]]:
-    """The forces (3,) [N] on the body, by name of the constraint in ``system``, the bone in ``contact`` or the touching part, and
-    their moments (3,) [N mm] about the origin. The force at an unknown of several regions is ``divided`` between these, so that all
-    forces balance; otherwise it counts in each region.
+    """The forces (3,) [N] on the body and their moments (3,) [N mm] about the origin, by the name of the constraint in ``system``,
+    the bone in ``contact`` or the touching part.
+
+    The force at an unknown of several regions is ``divided`` between the regions, so that all forces balance; otherwise it counts
+    in each region.
     """
     residual, now, comm = system.reactions(), system.unknowns.x.array, system.unknowns.function_space.mesh.comm
     shared = np.zeros(len(now), np.int64)

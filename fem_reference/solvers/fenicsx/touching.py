@@ -24,7 +24,8 @@ from fem_reference.solvers.fenicsx.touching_passes import Met, Pass, PressedPoin
 
 # With friction no point may slide farther than this beyond the facet on which it begins a load step, in reference coordinates.
 _FAR = 1.0
-# The unknowns (n,) of a search, the contact and the friction found in each pass, and the subtracted shares of overlaps at rest.
+# The unknowns (n,) of a search, the contact and the friction in each pass, and the fractions of overlaps at rest that are
+# subtracted.
 State = tuple[Floats, list[tuple[Met, PressedPoints]], list[Rubbed | None], list[float]]
 
 
@@ -32,7 +33,7 @@ class TouchingForces:
     """Contact between the parts of the surface named by ``touching``, on one rank; updated when the unknowns have changed."""
 
     def __init__(self, body: Body, form: Form, displacement: Displacement, spent: Spent) -> None:
-        """ArithmeticError if parts overlap at rest by more than the smoothing plus the overlap that is removed."""
+        """Raises ArithmeticError if parts overlap at rest by more than the smoothing plus the overlap that is removed."""
         self.unknowns, self.spent = displacement.unknowns, spent
         self.passes, self.rims = self._passes(body, form, displacement)
         self.now = list[tuple[Met, PressedPoints]]()
@@ -47,7 +48,7 @@ class TouchingForces:
             seen = max(depth for one, depth in depths if one is law)
             left = max(seen, 0.0) + unseen(body.mesh, law) if law.relaxed else 0.0
             deep, most = max(seen, overlap(body, law)), law.smoothing + left
-            if deep > most:  # deeper than the smoothing, what is removed, and what may lie undetected between points
+            if deep > most:  # deeper than the smoothing, the removed overlap, and what points may fail to detect
                 raise ArithmeticError(
                     f'"{law.one}" and "{law.other}" overlap by {deep:.3g} mm; at most {most:.3g} mm is allowed'
                 )
@@ -66,13 +67,13 @@ class TouchingForces:
                 self.seen = np.full_like(self.seen, np.nan)
 
     def acting(self) -> list[float]:
-        """The shares of overlaps at rest that are subtracted."""
+        """The fractions of overlaps at rest that are subtracted."""
         return [one.share for one in self.passes]
 
     @staticmethod
     def _passes(body: Body, form: Form, displacement: Displacement) -> tuple[list[Pass], list[Pass | None]]:
-        """Two passes for each law, one from each side (only one if a part touches itself). For each pass, also the skin around the
-        other part that its points must not touch; None if there is no such skin, or if it takes part in the contact.
+        """Two passes for each law, one from each side (a single one if a part touches itself); and for each pass the skin around
+        the other part, which the points of the pass must not touch. It is None if there is none or it takes part in contact.
         """
         both = ((law, dict.fromkeys(((law.one, law.other), (law.other, law.one)))) for law in body.touching)
         sides = [(law, *pair) for law, pairs in both for pair in pairs]
@@ -89,7 +90,7 @@ class TouchingForces:
         return passes, rims
 
     def look(self) -> None:
-        """Find the contact at the present unknowns, unless they are those of the last search."""
+        """Find the contact at the current unknowns, unless they are those of the last search."""
         if not np.array_equal(self.seen, self.unknowns.x.array):
             with self.spent.on("contact"):
                 self.seen = np.array(self.unknowns.x.array)
@@ -150,10 +151,10 @@ class TouchingForces:
         return found
 
     def scalars(self) -> dict[str, float]:
-        """The greatest ``touching_depth`` [mm] and ``touching_pressure`` [MPa] at a point, for several laws also the pressure of
-        each (``Touching.pressure_name``); the undeformed area under pressure, averaged over both sides, ``touching_area`` [mm2];
-        the number of points under pressure, ``touching_points``; the depth of the deepest point at rest, if it is removed,
-        ``touching_overlap_at_rest`` [mm]; and with friction its dissipated work since the start, ``touching_friction_work`` [N mm].
+        """The maximum ``touching_depth`` [mm] and ``touching_pressure`` [MPa] of all points; with several laws, the maximum
+        pressure of each law (``Touching.pressure_name``); ``touching_area`` [mm2], the undeformed area under pressure, averaged
+        over both sides; ``touching_points``, the number of points under pressure; ``touching_overlap_at_rest`` [mm], the depth of
+        the deepest point at rest, if the overlap is removed; and ``touching_friction_work`` [N mm], dissipated since the start.
         """
         self.look()
         pairs = list(zip(self.passes, self.now, strict=True))
@@ -173,7 +174,7 @@ class TouchingForces:
         } | more
 
     def settle(self) -> None:
-        """Take the present state as the start of the next step."""
+        """Accept the current state as the start of the next step."""
         self.look()
         for one, (met, _), rubbed in zip(self.rubbing, self.now, self.rubbed, strict=True):
             if one:
@@ -188,21 +189,21 @@ class TouchingForces:
 
     @property
     def state(self) -> State:
-        """The contact at the unknowns of the last search, which determines the facets on which points stay in the next search."""
+        """The contact at the unknowns of the last search. It determines the facets on which points stay in the next search."""
         return self.seen, self.now, self.rubbed, self.acting()
 
     def restoring(self) -> Callable[[], None]:
-        """A function that restores the present state, once the unknowns have been restored."""
+        """The function that restores the current contact after the unknowns have been restored."""
         return partial(self.go_back, self.state)
 
     def go_back(self, state: State | None = None) -> None:
-        """Restore an earlier ``state``, by default the settled one, once the unknowns have been restored."""
+        """Restore an earlier ``state``, by default the settled one, after the unknowns have been restored."""
         self.seen, self.now, self.rubbed, shares = state or self.settled
         if shares != self.acting():  # the pressures are those of another frame
             self.seen = np.full_like(self.seen, np.nan)
 
     def trouble(self, before: Floats, /) -> Trouble | None:
-        """The trouble *diverged* if a point went through the other part, past its rim or too far since ``before`` (n,)."""
+        """The trouble *diverged* if a point has gone through the other part, past its rim, or too far since ``before`` (n,)."""
         self.look()
         columns = self.passes, self.rims, self.settled[1], self.now, self.rubbed
         for one, rim, (last, _), (met, _), rubbed in zip(*columns, strict=True):
@@ -223,5 +224,5 @@ class TouchingForces:
 
 
 def touching_of(body: Body, form: Form, displacement: Displacement, spent: Spent) -> TouchingForces | None:
-    """The contact between parts of the surface of a ``body``, None if the body names none."""
+    """The contact between parts of the surface of a ``body``; None if no parts may touch."""
     return TouchingForces(body, form, displacement, spent) if body.touching else None

@@ -12,27 +12,27 @@ from fem_reference.problems.touching import Touching
 from fem_reference.solvers.fenicsx.facets import FacetPlaces, Facets
 from fem_reference.solvers.fenicsx.own_pairs import OwnPairs, pairs
 
-# A place is on a facet up to this distance beyond its edges, in reference coordinates: on a convex surface, points between the
-# normals of two facets at their common edge are nearest to neither.
+# A point counts as on a facet up to this distance beyond the edges, in reference coordinates: on a convex surface, points between
+# the normals of two facets at their common edge are nearest to neither facet.
 _BEYOND = 0.02
-# A point stays on its facet up to this distance beyond the edges, unless another is nearer by more than the smoothing: where two
-# facets meet at an angle, Newton's method would go back and forth between them.
+# A point stays on its facet up to this distance beyond the edges, unless another facet is nearer by more than the smoothing: where
+# two facets meet at an angle, Newton's method would go back and forth between them.
 _STAYS = 0.05
 # The cosine between normals above which a point that slides off a sharp edge is free, as the part faces another way there.
 _FACING = -0.5
-# In self-contact, a point behind a facet by less than this share of their radii and half thicknesses counts as in front.
+# In self-contact, a point behind a facet by less than this fraction of their radii and half thicknesses counts as in front.
 _DEEP = 0.125
-# The cosine between a normal and the opposite one up to which a point does not face a place, and contact has no pressure.
+# There is no contact pressure up to this cosine between a point's normal and minus the facet's: the point does not face the facet.
 GRAZING = 0.3
-_AT_ONCE = 100000  # pairs whose paths are followed together
-_SWING = 5 / 3  # a place on a facet moves at most this times as far as its nodes (Lebesgue constant of P2)
-_BULGE = 1.25  # a facet bulges from a plane at most this times as far as its farthest node
+_AT_ONCE = 100000  # pairs of points and facets whose paths are followed together
+_SWING = 5 / 3  # a point of a facet moves at most this many times as far as its nodes (Lebesgue constant of P2)
+_BULGE = 1.25  # a facet bulges from a plane at most this many times as far as its farthest node
 
 
 @dataclass(frozen=True, eq=False)
 class Met:
     """The n ``points`` of one side that are near the other: their places ``here`` on their own facets ``own`` (n,), the places
-    ``there`` on the ``facets`` (n,) that they meet, and the ``gap`` (n,) [mm] along the normal there, negative inside.
+    ``there`` that they meet on the other side's ``facets`` (n,), and the ``gap`` (n,) [mm] along the normal there, negative inside.
     """
 
     points: Ints
@@ -43,17 +43,17 @@ class Met:
     gap: Floats
 
     def some(self, which: Ints) -> "Met":
-        """The points with the numbers ``which`` (k,) among these."""
+        """The points with the indices ``which`` (k,) in this record."""
         here, there = self.here[which], self.there[which]
         return Met(self.points[which], self.own[which], here, self.facets[which], there, self.gap[which])
 
 
 @dataclass(frozen=True, eq=False)
 class PressedPoints:
-    """Contact of n points: the unknowns ``dofs`` (n, a) of the nodes that carry them and the places they meet; in these, the first
-    derivatives ``rows`` (n, r, a) of five, the gap, the position along two tangents and the facet's slopes along the normal, or of
-    others; the ``pull`` (n, r) [N] along these, its derivative ``second`` (n, r, r), signed like an energy's second one, and the
-    ``force`` (n, 3) [N] on the points.
+    """Contact of n points. ``dofs`` (n, a): the unknowns of the nodes that carry the points and the places they meet; ``rows``
+    (n, r, a): the derivatives of r quantities by these unknowns, such as the gap, the position along two tangents and the tangents
+    along the normal; ``pull`` (n, r) [N]: the forces that belong to the quantities; ``second`` (n, r, r): their derivatives, with
+    the sign of an energy's Hessian; ``force`` (n, 3) [N]: the forces on the points.
     """
 
     dofs: Ints
@@ -63,14 +63,14 @@ class PressedPoints:
     force: Floats
 
 
-# The unknowns (n,) of a settled state, and the points that met facets in it, if known.
+# The unknowns (n,) of a settled state, and the points that met facets in this state, if known.
 Settled = tuple[Floats, Met | None]
 
 
 class Pass:
-    """Points of one ``side`` against facets of the ``other``; ``areas`` (n,): half their rest areas [mm2]; ``names``: of both."""
+    """Points of one ``side`` against facets of the ``other``. ``areas`` (n,) [mm2]: half the rest areas; ``names``: of both."""
 
-    degree = 8  # of quadrature; with 5, the pressure between two blocks with unrelated meshes is off by 5, not 2 %
+    degree = 8  # of the quadrature; with 5, the pressure between blocks of unrelated meshes is off by 5 %, not by 2 %
 
     def __init__(self, law: Touching, side: Facets, other: Facets, names: tuple[str, str]) -> None:
         self.law, self.side, self.other, self.names = law, side, other, names
@@ -82,11 +82,11 @@ class Pass:
         corners = Delaunay(other.element.points).simplices  # the corners of flat pieces of a facet
         turned = np.linalg.det(other.element.points[corners[:, 1:]] - other.element.points[corners[:, :1]]) < 0
         corners[turned] = corners[turned][:, ::-1]
-        self.overlaps, self.share = np.zeros(len(self.areas)), 0.0  # at rest, and the share subtracted now
+        self.overlaps, self.share = np.zeros(len(self.areas)), 0.0  # at rest, and the fraction of them subtracted now
         self.pieces = np.where(other.outward[:, None, None] > 0, corners, corners[:, ::-1])
         middle = other.places(other.rest, np.arange(len(other.rest)), np.full((len(other.rest), 2), 1 / 3))
         self.own = OwnPairs(side) if side is other else None
-        # Deeper than half the thickness of a part, its other side is nearer. Self-penetration at rest does not count as thinness.
+        # Below half the thickness of a part, its far side is nearer. Self-penetration at rest does not count as thinness.
         inset = law.smoothing if self.own else 0.0
         triangles = other.rest[np.arange(len(other.rest))[:, None, None], self.pieces].reshape(-1, 3, 3)
         starts = middle.point - inset * middle.normal
@@ -97,14 +97,14 @@ class Pass:
         return self.side.places(nodes, points // self.each, self.at[points % self.each])
 
     def places(self, unknowns: Floats) -> Floats:
-        """The present positions (n, 3) [mm] of the points."""
+        """The current positions (n, 3) [mm] of the points."""
         return np.asarray((self.basis @ self.side.nodes(unknowns)).reshape(-1, 3))
 
     def met(self, unknowns: Floats, most: float, last: Met | None = None, settled: Settled | None = None) -> Met:
-        """The points at gaps up to ``most`` [mm], each with the nearest facet that faces it, or the one it met ``last``. A facet
-        reaches as deep as its radius and half the thickness of its part. In self-contact, only points that in the ``settled``
-        state, by default the present one, were in front of their facet, or in contact with it or its neighbour: behind a facet is
-        the body itself.
+        """The points at gaps up to ``most`` [mm], each with the nearest facet that faces it, or with the facet that it met
+        ``last``. A facet is met to a depth of its radius or half the thickness of its part, whichever is smaller. In self-contact
+        the body itself is behind a facet; so a point counts only if, in the ``settled`` state (by default the current one), it was
+        in front of the facet, or in contact with the facet or a neighbour.
         """
         nodes, points = self.other.nodes(unknowns), self.places(unknowns)
         middles, radii = self.other.balls(nodes)
@@ -121,7 +121,7 @@ class Pass:
         felt = np.flatnonzero((gap < most) & (gap > -self._reach(nodes)[facets]) & at_edge)
         here = self._here(self.side.nodes(unknowns), some[felt])
         facing = np.einsum("ni,ni->n", here.normal, there.normal[felt])
-        # A point just beyond the edge of a facet that it sees from inside is outside: the facet before it is out of reach.
+        # A point just beyond the edge of a facet that it sees from inside is outside: the facet in front of it is out of reach.
         edge_on = (gap[felt] < -most) & (beyond[felt] > 0) & (facing > _FACING) & ~held[felt]
         faces = (facing < 0) & ~edge_on
         found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt])
@@ -134,7 +134,7 @@ class Pass:
         return found.some(order[np.unique(found.points[order], return_index=True)[1]])
 
     def _outside(self, some: Ints, facets: Ints, settled: Settled) -> tuple[Ints, Ints]:
-        """The pairs, in self-contact, of points and facets where the point was in front of the facet or in contact there."""
+        """Keep, in self-contact, only pairs in which the point was in front of the facet or in contact with it or a neighbour."""
         if self.own is None:
             return some, facets
         unknowns, then = settled
@@ -153,8 +153,8 @@ class Pass:
     def _near(
         self, points: Floats, balls: tuple[Floats, Floats], reach: Floats, more: Floats, *states: Floats
     ) -> tuple[Ints, Ints]:
-        """Pairs of ``points`` (n, 3) and of facets whose middles are within the facet's ``reach`` (m,) [mm] plus what a point
-        reaches ``more`` (n,); in self-contact only those whose facets may touch (``OwnPairs.near``), the points being in one.
+        """Pairs of ``points`` (n, 3) and facets in which the point is within the facet's ``reach`` (m,) [mm] plus the point's
+        ``more`` (n,) [mm] of the facet's centre. In self-contact, only pairs of facets that may touch (``OwnPairs.near``) count.
         """
         if self.own is None:
             return pairs(points, balls[0], reach + more.max())
@@ -164,36 +164,36 @@ class Pass:
         return some[close], facets[close]
 
     def _beside(self, nodes: Floats, points: Floats, some: Ints, facets: Ints, most: float) -> tuple[Ints, Ints]:
-        """Pairs, among the given ones, of points and facets whose gap may be at most ``most`` [mm] and whose depth may be below the
-        radius, judged by the plane through the middle of the facet and the heights of its nodes above that.
+        """Those of the given pairs of points and facets whose gap may be at most ``most`` [mm] and whose depth may be within reach,
+        judged by the plane through the centre of the facet and the heights of the nodes above this plane.
         """
         height, bulge = self._heights(nodes, points, some, facets)
         kept = (height < most + bulge[facets]) & (height > -(self._reach(nodes) + bulge)[facets])
         return some[kept], facets[kept]
 
     def _heights(self, nodes: Floats, points: Floats, some: Ints, facets: Ints) -> tuple[Floats, Floats]:
-        """The heights (n,) [mm] of points above planes through the middles of facets, and each facet's greatest bulge (m,)."""
+        """The heights (n,) [mm] of points above planes through the centres of facets, and the maximum bulge (m,) of each facet."""
         middle = self.other.places(nodes, np.arange(len(nodes)), np.full((len(nodes), 2), 1 / 3))
         heights = np.einsum("mki,mi->mk", nodes - middle.point[:, None], middle.normal)
         bulge = np.abs(heights).max(axis=1) * _BULGE
         return np.vecdot(points[some] - middle.point[facets], middle.normal[facets]), bulge
 
     def pressure(self, met: Met) -> tuple[Floats, Floats]:
-        """Pressure (n,) [MPa] of points that ``met`` the other side, less that of overlaps at rest, and its slope in the gap."""
+        """The pressure (n,) [MPa] on points that ``met`` the other side, without overlaps at rest, and its slope in the gap."""
         (whole, slope), shares = self.whole(met), self.shares(met)
         return shares * whole, shares * slope
 
     def whole(self, met: Met) -> tuple[Floats, Floats]:
-        """The ``pressure``, without shares, and its slope."""
+        """The ``pressure`` before multiplication by ``shares``, and its slope in the gap."""
         return self.law.pressure(met.gap + self.share * self.overlaps[met.points])
 
     def shares(self, met: Met) -> Floats:
-        """The shares (n,) of the pressure that points have."""
+        """The fractions (n,) of the full pressure that act on the points."""
         return np.ones(len(met.gap))
 
     def let_fall(self, met: Met) -> None:
-        """In self-contact whose overlap at rest stays, reduce what is subtracted until the points that ``met`` the other side just
-        have no pressure, and to 0 for others: once apart, points press as others do when they meet again.
+        """In self-contact whose overlap at rest stays, reduce the subtracted overlap until the points that ``met`` the other side
+        just have no pressure, and to 0 for all other points: points that come apart press as usual when they meet again.
         """
         if self.own and self.law.relaxed is None:
             left = np.zeros_like(self.overlaps)
@@ -203,9 +203,9 @@ class Pass:
     def pressed(self, met: Met) -> PressedPoints:
         """The contact of the points that ``met`` the other side.
 
-        With a place y(s, t) on the facet and its unit normal n, the gap of a point x is ``g = n (x - y)`` where x - y is along n.
-        So ``dg = n (dx - dy)``, and for ``T = y' (dx - dy)`` and ``D = n dy'`` along both tangents y', with ``a = y' y'``,
-        ``b = n y''`` and ``m = a - g b``, ``-d2g = T m^-1 b a^-1 T + 2 T m^-1 D + g D m^-1 D``.
+        The gap of a point x is ``g = n (x - y)``, where y(s, t) is the place on the facet, with unit normal n, for which x - y is
+        along n. So ``dg = n (dx - dy)``. With ``T = y' (dx - dy)`` and ``D = n dy'`` along both tangents y', ``a = y' y'``,
+        ``b = n y''`` and ``m = a - g b``, the second derivative is ``-d2g = T m^-1 b a^-1 T + 2 T m^-1 D + g D m^-1 D``.
         """
         there, (pressure, change) = met.there, self.pressure(met)
         away = np.concatenate([met.here.basis, -there.basis], axis=1)
@@ -227,24 +227,24 @@ class Pass:
         return PressedPoints(self._dofs(met), np.stack(rows, axis=1), pull, areas[:, None, None] * second, force)
 
     def _dofs(self, met: Met) -> Ints:
-        """The unknowns (n, a) of the nodes that carry points and the places that they ``met``."""
+        """The unknowns (n, a) of the nodes that carry the points and the places that they ``met``."""
         dofs = np.concatenate([self.side.dofs[met.own], self.other.dofs[met.facets]], axis=1)
         return dofs.reshape(len(dofs), 3 * dofs.shape[1])
 
     def depth(self, met: Met) -> float:
-        """The greatest depth [mm] of the points that ``met`` the other side."""
+        """The maximum depth [mm] of the points that ``met`` the other side."""
         return float((-met.gap).max(initial=0.0))
 
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
-        """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), without those that ``met``
-        it: they are behind the facet that they were near, or passed one on their path. Paths that begin inside, or so near that
-        flat pieces of a facet may be in front, are also followed from in front, raised by at most the facet's reach, within which
-        points are met. Points that end in front of a facet passed only its flat pieces.
+        """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), without points that
+        ``met`` it: they are behind the facet that they were near, or passed a facet on their path. Paths that begin inside, or so
+        near that flat pieces of a facet may be in front, are also followed from in front, raised by at most the facet's reach,
+        within which points are met. Points that end in front of a facet have passed only flat pieces of it.
         """
         return self._passed_by(before, last, now, met.points, np.zeros(len(self.areas)))
 
     def _passed_by(self, before: Floats, last: Met, now: Floats, seen: Ints, deep: Floats) -> Ints:
-        """The points as in ``through``, without those ``seen``, or up to ``deep`` (n,) [mm] behind a facet they do not face."""
+        """The points as in ``through``, except those ``seen`` or up to ``deep`` (n,) [mm] behind a facet they do not face."""
         starts, ends = self.places(before), self.places(now)
         old, new = self.other.nodes(before), self.other.nodes(now)
         shift = (new - old).mean(axis=(0, 1))  # a common displacement changes nothing
@@ -269,13 +269,13 @@ class Pass:
         return np.unique(points[np.where(first, on & ~safe & (gap < 0), ~(on & safe))])
 
     def _reach(self, nodes: Floats) -> Floats:
-        """The depth (m,) [mm] to which facets with ``nodes`` (m, k, 3) are met: their radius or half the thickness."""
+        """The depth (m,) [mm] to which facets with ``nodes`` (m, k, 3) are met: the smaller of radius and half thickness."""
         return np.minimum(self.other.balls(nodes)[1], self.deepest)
 
     def slid(self, now: Floats, pressed: Ints, met: Ints) -> Ints:
         """The points (k,) that reach the other side, a skin that may not be touched, at the unknowns ``now`` (n,) without contact:
-        those that were ``pressed`` before on the part beside it, and any that are deep. Points that ``met`` a part are in contact;
-        a point above the part may be behind a wall of it, but is then beyond the wall's edge.
+        points that were ``pressed`` before by the part next to the skin, and all deep points. Points that ``met`` a part are in
+        contact. A point above the part may be behind a wall of the skin, but is then beyond the wall's edge.
         """
         near = self.met(now, self.law.smoothing)
         facing = np.einsum("ni,ni->n", near.here.normal, near.there.normal) < _FACING
@@ -284,7 +284,7 @@ class Pass:
         return np.asarray(near.points[lost & ~np.isin(near.points, met)])
 
     def _passed(self, starts: Floats, ends: Floats, free: NDArray[np.bool_], old: Floats, new: Floats) -> Ints:
-        """The ``free`` points (n,) that pass flat pieces of facets on their path, and these facets: (2, p)."""
+        """The ``free`` points (n,) that pass flat pieces of facets on their paths, and these facets: (2, p)."""
         (first, wide), (last, later) = self.other.balls(old), self.other.balls(new)
         far = np.linalg.norm(ends - starts, axis=1) / 2
         radii = np.maximum(wide, later) + np.linalg.norm(last - first, axis=1) / 2

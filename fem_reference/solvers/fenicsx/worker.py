@@ -1,4 +1,4 @@
-"""The solving process: it reads pickled jobs, marches each body through its frames, and reports every frame."""
+"""The worker process: it reads pickled jobs, marches each body through its frames, and reports every frame."""
 
 import gc
 import pickle
@@ -27,7 +27,7 @@ from fem_reference.solvers.common.load_steps import Attempt, Step, StepSizes, ma
 
 
 _COUNTED = ("factorisations", "factorisation_flops", "krylov_iterations", "halved_steps")
-_numbers = count()  # of reports
+_numbers = count()  # of the reports
 
 
 class Worker:
@@ -46,16 +46,16 @@ class Worker:
         self.solving = self.solving_processor = self.checking = 0.0
         self.reported = 0.0  # ``solving_processor`` up to the last reported frame
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}
-        self.unstable: dict[float, tuple[float, float]] = {}  # for each frame: negative modes, those of the material
+        self.unstable: dict[float, tuple[float, float]] = {}  # by frame: negative modes, and those of the material
         self.left: dict[float, float] = {}  # the perturbation [mm] in each frame that has one
         self.ranges = Ranges()
         self.exact = False  # True once linear systems are solved exactly, after a failure of Newton's method
-        self.collapse = ""  # the message of an attempt, since the last good state, in which the body collapsed
+        self.collapse = ""  # the message of the attempt since the last good state in which the body collapsed
         self.earlier: dict[str, float] = {}  # the cost of earlier processes of this run
         self.restart = Restart(self.body, job.kept) if job.kept else None
 
     def begin(self) -> tuple[tuple[float, ...], StepSizes]:
-        """The frames to march through and the load steps: from rest, or from the frame at which an earlier process was cut off."""
+        """The frames to march through and the load steps, from rest or from the frame at which an earlier process was cut off."""
         frames, settings = self.job.body.frames, self.settings
         first, good = settings.first_step, self.restart.good() if self.restart else ()
         if not self.restart or not good:
@@ -105,7 +105,7 @@ class Worker:
         return other
 
     def departures(self) -> str:
-        """The note on unstable equilibria that the run has left by a perturbation; empty without any."""
+        """A note on unstable equilibria that the run has left by a perturbation; empty if there are none."""
         if not self.left:
             return ""
         return (
@@ -114,7 +114,9 @@ class Worker:
         )
 
     def negative_modes(self, frame: float) -> dict[str, float]:
-        """The number of directions in which the energy falls from a reached state, if known; its time does not count as solving."""
+        """The number of directions in which the energy decreases from a reached state, and of those due to the material, if known.
+        The time spent on them does not count as solving.
+        """
         begin = time.perf_counter()
         modes = self.body.examine(frame)
         own = self.body.modes_of_material() if modes is not None and modes > 0 else modes
@@ -122,7 +124,7 @@ class Worker:
         return {} if modes is None or own is None else {"negative_modes": modes, "material_modes": own}
 
     def instability(self) -> str:
-        """The note on unstable states; empty if there are none."""
+        """A note on unstable states; empty if there are none."""
         if not self.unstable:
             return ""
         most, own = (max(modes) for modes in zip(*self.unstable.values(), strict=True))
@@ -132,7 +134,7 @@ class Worker:
         )
 
     def failure(self, reached: Step) -> tuple[Status, str]:
-        """The status of a run that did not reach a frame, and a sentence with the reason, the place and a remedy."""
+        """The status of a run that did not reach a frame, and a sentence with the reason, the position and a remedy."""
         body, contact = self.body, self.body.contact
         other = "a larger bulk modulus" if self.collapse else "smaller cells"
         self.ranges.add(reached.at, body.validity.examine(reached.at)[1])
@@ -150,7 +152,7 @@ class Worker:
         return (reached.last.status, sentence) if limit is None else ("limit point", f"{limit}; {sentence}")
 
     def report_frame(self, reached: Step) -> None:
-        """Report the state of a reached frame and keep it if the run may have to continue from it."""
+        """Report the state of a reached frame, and store it if the run may have to continue from it."""
         body, frame = self.body, reached.frame
         samples = {name: body.positions(*sample) for name, sample in self.job.samples.items()}
         forces, moments = reactions(body.system, body.contact, divided=bool(samples))
@@ -220,7 +222,7 @@ def solve(job: Job | FieldProblem, report: Sink) -> Outcome:
 
 
 def report(folder: Path, found: Frame | Outcome) -> None:
-    """Write ``found``, on the first rank, into a file in the ``folder``, and report the file to the parent process."""
+    """Write ``found`` into a file in the ``folder`` and report the file to the parent process, on the first rank only."""
     if MPI.COMM_WORLD.rank == 0:
         file = folder / f"report_{next(_numbers)}.pickle"
         file.write_bytes(pickle.dumps(found))
@@ -229,7 +231,7 @@ def report(folder: Path, found: Frame | Outcome) -> None:
 
 
 def main() -> None:
-    """Solve jobs one after the other; standard input names the file of each."""
+    """Solve jobs one after the other. Each line of standard input names the file of a job."""
     end_with_starter()
     compiling.prepare()
     gc.freeze()  # collections after each job then skip imported objects, which stay
