@@ -53,8 +53,8 @@ class ContactLaw:
     ``friction``: the coefficient of Coulomb's law, None without friction. A point sticks to the bone by a spring of stiffness k,
     and slides once its traction reaches ``friction`` times the pressure.
 
-    ``parts``: for several bodies solved as one, the name of each body and the range of its points in the skin. Forces are then
-    reported for each body too.
+    ``parts``: for several bodies solved as one, the name of each body and the range of its points in the skin. There is then one
+    force for each body and bone instead of one for each bone.
     """
 
     on: str | Skin
