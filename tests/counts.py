@@ -55,10 +55,11 @@ HEADLESS = {
 
 
 class Module(NamedTuple):
-    """A file of the package: its ``name`` below it, its ``lines`` and its ``tree``."""
+    """A file of the package: its ``name`` below it, its ``lines``, those of ``code`` and its ``tree``."""
 
     name: str
     lines: int
+    code: int
     tree: ast.Module
 
 
@@ -66,9 +67,17 @@ class Module(NamedTuple):
 def modules() -> list[Module]:
     """Every file of the package, parsed once."""
     texts = {path: path.read_text(encoding="utf-8") for path in sorted(PACKAGE.rglob("*.py"))}
-    return [
-        Module(str(path.relative_to(PACKAGE)), len(text.splitlines()), ast.parse(text)) for path, text in texts.items()
-    ]
+    return [Module(str(path.relative_to(PACKAGE)), *sizes(text), ast.parse(text)) for path, text in texts.items()]
+
+
+def sizes(text: str) -> tuple[int, int]:
+    """The number of lines of a source ``text``, and of those that are neither blank nor of a comment or a docstring."""
+    lines = text.splitlines()
+    words = {i for i, line in enumerate(lines, 1) if not line.strip() or line.lstrip().startswith("#")}
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
+            words |= set(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
+    return len(lines), len(lines) - len(words)
 
 
 def imported(tree: ast.AST) -> set[str]:
@@ -219,7 +228,11 @@ ADDED = {
     "regions in the export to FEBio, the law corotated": 140,
     "error bars from two runs at a time, on tetrahedra that can be set up": 110,
     "lines that end at facets out of reach": 15,
+    "docstrings that say in sentences what each argument and result is": 1370,
+    "distinct rows as sorted integers, keys of stored meshes with all code, a loader that counts": 96,
 }
+# The same limit for lines of code: those that are neither blank nor part of a comment or a docstring.
+CODE = 36_000
 
 
 def main(words: list[str]) -> int:
@@ -227,8 +240,10 @@ def main(words: list[str]) -> int:
     house = modules()
     total = sum(module.lines for module in house)
     most = LINES + sum(ADDED.values())
+    code = sum(module.code for module in house)
     sys.stdout.write(f"{total:6} of at most {most}: lines of the library\n")
-    over = total > most
+    sys.stdout.write(f"{code:6} of at most {CODE}: lines of code\n")
+    over = total > most or code > CODE
     for count in COUNTS:
         places = list(count.places(house))
         over |= len(places) > count.most

@@ -37,7 +37,7 @@ class FieldMesh:
         """Facets that belong to only one cell: the end vertices (f, 1) of an interval, or the rim edges (f, 2) of triangles."""
         parts = self.cells.reshape(-1, 1) if self.cells.shape[1] == 2 else _all_edges(self.cells)
         found = distinct(parts)
-        return found.rows[found.counts == 1]
+        return np.asarray(found.rows[found.counts == 1])
 
     def edge_numbers(self, pairs: Ints) -> Ints:
         """Index (k,) in ``edges`` of each pair of vertices in ``pairs`` (k, 2), which must be an edge."""

@@ -96,7 +96,7 @@ def collapses(lab: Lab, element: str, poisson: float) -> Finding:
     solved = squeezed(lab, element, poisson, tuple(1 - frame for frame in frames(1 - HEIGHT, 6)))
     least = min(state.scalars["min_cell_volume_ratio"] for state in solved.states)
     ended = solved.outcome.status in ("collapsed", "diverged", "limit point")
-    found = ended and least >= 0.2 and "incompressible is outside the range" in solved.outcome.message
+    found = ended and least >= 0.2 and "incompressible is outside its range" in solved.outcome.message
     return Finding(float(found), note=f"{solved.outcome.status}: {solved.outcome.message}")
 
 

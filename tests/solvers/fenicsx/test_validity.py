@@ -237,14 +237,14 @@ def test_a_law_has_its_range_where_it_acts(session) -> None:
     """Of eight cells half are in the region of the law: these are outside its range."""
     solved = drawn(session, (ACTIVE.model_copy(update={"region": "half"}),), 1.8)
     assert solved.last.scalars["outside_law"] == 4
-    assert "fibre_active is outside the range" in solved.outcome.message
+    assert "fibre_active is outside its range" in solved.outcome.message
 
 
 def test_fibres_are_as_long_as_their_prestretch_has_them(session) -> None:
     prestretch = effect("prestretch", stretch=1.5, ramp=ONCE)
     solved = drawn(session, (PASSIVE, prestretch), 1.2)
     assert solved.last.scalars["max_cell_fibre_stretch"] == pytest.approx(1.2 * 1.5, abs=1e-9)
-    assert "fibre_passive is outside the range" in solved.outcome.message
+    assert "fibre_passive is outside its range" in solved.outcome.message
 
 
 @pytest.mark.usefixtures("all_cores")
@@ -258,7 +258,7 @@ def test_ranks_agree_on_what_is_outside(session) -> None:  # noqa: ARG001 - it s
         frames = []
         outcome = fenicsx.solve(problem, Settings(ranks=ranks, first_step=0.25), frames.append)
         assert outcome.status == "converged"
-        assert "fibre_active is outside the range" in outcome.message
+        assert "fibre_active is outside its range" in outcome.message
         assert f"a law outside its range in {frames[-1].scalars['outside_law']:.0f} cells" in frames[-1].note
         found.append({name: value for name, value in frames[-1].scalars.items() if "cell" in name or "law" in name})
     assert found[1] == pytest.approx(found[0], abs=1e-6)
