@@ -48,7 +48,8 @@ def test_a_range_of_an_effect_that_is_left_out_is_refused(auto: MuscleCase, tmp_
     want = r'uncertain\[1\]\.key: got "effect\[2\]\.stiffness", of contact stiffness, which this case leaves out, want'
     with pytest.raises(InputError, match=want):
         study(case, tmp_path / "runs", Workers(), runs=4)
-    with pytest.raises(InputError, match=r'--fit: got "effect\[2\]\.stiffness" \(contact stiffness\), a parameter of an effect that this case'):
+    want = r'--fit: got "effect\[2\]\.stiffness" \(contact stiffness\), a parameter of an effect that this case'
+    with pytest.raises(InputError, match=want):
         chosen(unknowns(auto), ["effect[2].stiffness"])
     listed = case.model_copy(update={"choice": "listed"})
     assert soft.key in [one.key for one in unknowns(listed).parameters()]
