@@ -5,7 +5,7 @@ Tricubic B-splines interpolate between the nodes, so gradient and curvature are 
 
 import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -149,50 +149,59 @@ def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0
     ``check_closed``).
 
     ``rounding`` is the standard deviation s [mm] of a Gaussian filter of the distance, used because contact does not slide smoothly
-    along flat triangles. A surface with a mean curvature of 1/r moves inward by s^2/r; this shift is part of the error.
+    over the edges between flat triangles. A surface with a mean curvature of 1/r moves inward by s^2/r; this shift is part of the
+    error.
     """
-    check_finite(surface)
-    outward, _ = igl.bfs_orient(surface.triangles)
-    surface = check_closed(Surface(surface.points, outward, surface.place))
-    low, shape = _extent(surface, spacing, margin)
-    values = _on_nodes(surface, low, shape, spacing, margin)
-    if rounding > 0:
-        values = scipy.ndimage.gaussian_filter(values, rounding / spacing, mode="nearest")
-    grid = Grid(_coefficients(values), tuple((low - spacing).tolist()), spacing, margin, np.nan, np.nan)
-    largest, mean = _errors(grid, surface)
-    return replace(grid, error=largest, mean_error=mean)
+    surface = _outward(surface)
+    return _measured(_sampled(surface, spacing, margin)(rounding), surface)
 
 
-def resolve(surface: Surface, error: float, margin: float) -> Grid:
-    """Halve the spacing of a grid until its ``mean_error`` is at most ``error`` [mm] or ``MOST_NODES`` would be exceeded. Returns
-    the last grid, whose ``mean_error`` is the error that was reached.
+def resolve(surface: Surface, error: float, margin: float, rounding: float = 0.0) -> Grid:
+    """Return the grid of :func:`build` at a spacing that is halved until the grid without rounding has a ``mean_error`` of at most
+    ``error`` [mm], or until ``MOST_NODES`` would be exceeded.
 
     The largest error would not be a suitable criterion: on sharp edges and thin rims, which a grid rounds, it decreases only in
     proportion to the spacing, and in a slit narrower than a cell it does not decrease.
     """
+    surface = _outward(surface)
     spacing = float(np.ptp(surface.points, axis=0).max()) / _FIRST_CELLS
-    grid = build(surface, spacing, margin)
-    while not grid.mean_error <= error:
+    fitted = _sampled(surface, spacing, margin)
+    while not (reached := _mean(_beside(fitted(0.0), surface))) <= error:
         spacing /= 2
         if math.prod(_extent(surface, spacing, margin)[1]) > MOST_NODES:
-            logger.warning("%s: distance error of %.3g mm instead of %.3g mm", surface.place, grid.mean_error, error)
+            logger.warning("%s: distance error of %.3g mm instead of %.3g mm", surface.place, reached, error)
             break
-        grid = build(surface, spacing, margin)
-    return grid
+        fitted = _sampled(surface, spacing, margin)
+    return _measured(fitted(rounding), surface)
 
 
 def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
-    """Return the grid of :func:`build` at the spacing found by :func:`resolve`, stored in ``folder`` under a hash of its inputs and
-    of the code that computes it.
-    """
+    """Return the grid of :func:`resolve`, stored in ``folder`` under a hash of its inputs and of the code that computes it."""
     source = np.frombuffer(code().encode(), np.uint8)
     name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), source)
+    path = folder / f"distance_{name[:32]}.npz"
+    return kept(path, lambda: resolve(surface, error, margin, rounding), lambda grid: vars(grid), _grid)
 
-    def make() -> Grid:
-        grid = resolve(surface, error, margin)
-        return build(surface, grid.spacing, margin, rounding) if rounding > 0 else grid
 
-    return kept(folder / f"distance_{name[:32]}.npz", make, lambda grid: vars(grid), _grid)
+def _outward(surface: Surface) -> Surface:
+    """Return a closed surface with outward triangles; InputError if it does not bound one body."""
+    check_finite(surface)
+    outward, _ = igl.bfs_orient(surface.triangles)
+    return check_closed(Surface(surface.points, outward, surface.place))
+
+
+def _sampled(surface: Surface, spacing: float, margin: float) -> Callable[[float], Grid]:
+    """Sample the distance to an outward ``surface`` once. Returns a function that fits a grid, with unknown errors, to the samples
+    after a Gaussian filter whose standard deviation [mm] is its argument.
+    """
+    low, shape = _extent(surface, spacing, margin)
+    values = _on_nodes(surface, low, shape, spacing, margin)
+
+    def fitted(rounding: float) -> Grid:
+        filtered = scipy.ndimage.gaussian_filter(values, rounding / spacing, mode="nearest") if rounding > 0 else values
+        return Grid(_coefficients(filtered), tuple((low - spacing).tolist()), spacing, margin, np.nan, np.nan)
+
+    return fitted
 
 
 def _grid(arrays: dict[str, Any]) -> Grid:
@@ -235,12 +244,21 @@ def _coefficients(values: Floats) -> Floats:
     return np.asarray(scipy.ndimage.spline_filter(beyond, order=3)[keep, keep, keep])
 
 
-def _errors(grid: Grid, surface: Surface) -> tuple[float, float]:
-    """Return the largest difference [mm] from the exact distance on the surface and near it, and the root mean square near it."""
+def _measured(grid: Grid, surface: Surface) -> Grid:
+    """Return the grid with its errors [mm]: the largest one on the surface and near it, and the root mean square near it."""
+    beside = _beside(grid, surface)
+    largest = max(np.abs(grid.distances(_on(surface))).max(), np.abs(beside).max())
+    return replace(grid, error=float(largest), mean_error=_mean(beside))
+
+
+def _beside(grid: Grid, surface: Surface) -> Floats:
+    """Return the differences (n,) [mm] between the distance on a grid and the exact distance, at random points near the surface."""
     around = _around(surface, grid.spacing)
-    beside = grid.sample(around).distance - signed_distances(around, surface)
-    largest = max(np.abs(grid.sample(_on(surface)).distance).max(), np.abs(beside).max())
-    return float(largest), float(np.sqrt(np.mean(beside**2)))
+    return grid.distances(around) - signed_distances(around, surface)
+
+
+def _mean(differences: Floats) -> float:
+    return float(np.sqrt(np.mean(differences**2)))
 
 
 def _on(surface: Surface) -> Floats:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapes
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import NdBSpline
 
 from fem_reference.foundations.errors import InputError
@@ -226,6 +226,9 @@ def test_resolve_halves_until_the_error_is_reached() -> None:
     assert grid.mean_error <= enough
     assert_allclose(grid.spacing, first / 2)
     assert_allclose(resolve(body, 0.2, 2.0).spacing, first)
+    rounded = resolve(body, enough, 2.0, 0.7)  # the limit is for the grid without rounding, which moves the surface
+    assert rounded.mean_error > enough
+    assert_array_equal(rounded.coefficients, build(body, first / 2, 2.0, 0.7).coefficients)
 
 
 def test_resolve_stops_at_the_largest_grid_and_says_so(monkeypatch, caplog) -> None:
@@ -244,7 +247,7 @@ def counted(monkeypatch) -> list[float]:
     asked: list[float] = []
     random = np.random.default_rng(8).normal(size=(6, 7, 8))
 
-    def small(_surface: Surface, error: float, margin: float) -> Grid:
+    def small(_surface: Surface, error: float, margin: float, _rounding: float) -> Grid:
         asked.append(error)
         return Grid(random, (0.1, 1 / 3, -2.0), 1 / 7, margin, error / 3, error / 9)
 
