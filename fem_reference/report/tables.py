@@ -22,7 +22,7 @@ COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 # The columns of the first table: metric, statistic, heading of the group, heading of the column, unit.
 DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in described("table").items())
 
-# Measured with the same springs at points of the surface and over facets of tetrahedra, on two hip muscles (gluteus_medius and
+# Computed with the same springs at points of the surface and over facets of tetrahedra, on two hip muscles (gluteus_medius and
 # gluteus_maximus) at 1 rad.
 SPREAD = (
     "Attachments are springs, and 5 to 9 % of a force or moment depend on how the same springs are spread over them (5.3 and "
