@@ -54,8 +54,7 @@ def lame(case: MuscleCase, poisson: float) -> tuple[float, float]:
 
 
 def split(bench: Bench[MuscleCase], run: Run, law: Effect, takes: Collection[str] = ()) -> Split:
-    """Split the error of a ``run`` into parts. The solver uses ``law``, linear elements on the case's tetrahedra, and exact
-    attachments.
+    """Split the error of a ``run`` into parts. The solver has ``law``, the case's tetrahedra (linear), and exact attachments.
 
     ``takes``: other effects that the solver models. Raises InputError if an intermediate reference has no solution.
     """

@@ -126,7 +126,7 @@ def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | N
 
 
 def stored(reference: Run, muscle: str = "") -> ErrorBars | None:
-    """The error bars stored with a reference run, of one ``muscle`` of several; None if it has none by the current metrics."""
+    """The error bars stored with a reference run, of one ``muscle`` of several; None if there are none by the current metrics."""
     if reference.folder is None:
         return None
     folder = reference.folder / muscle
@@ -225,7 +225,7 @@ def check_coarser(bench: Bench[MuscleCase], fine: float, coarse: float) -> None:
 
 def safety(bench: Bench[MuscleCase]) -> float:
     """The factor of safety: that of a grid convergence index, times the ratio of the size of the unrefined tetrahedra to the radius
-    of the smallest attachment if it is above 1. Nested tetrahedra share the polygonal outline of an attachment, so their
+    of the smallest attachment, if this ratio is above 1. Nested tetrahedra share the polygonal outline of an attachment, so their
     difference does not show its error.
     """
     surface, attached = bench.setup().surface, bench.setup().attached
@@ -236,7 +236,7 @@ def safety(bench: Bench[MuscleCase]) -> float:
 
 def coarser[C: DrivenCase](bench: Bench[C]) -> tuple[Bench[C], float]:
     """A bench of the case with larger tetrahedra in every muscle, and the ratio of the sizes: the same for all, as errors of one
-    muscle reach its neighbours. If all muscles are refined, the last refinement is left out. Raises InputError if this fails.
+    muscle reach its neighbours. If all are refined, the last refinement is left out. Raises InputError if no case can be set up.
     """
     case, failed = bench.scene, list[InputError]()
     if all(one.refinements for one in muscles_of(case)):
