@@ -31,12 +31,12 @@ SPREAD = (
 
 
 def summary(comparison: Comparison) -> dict[str, Any]:
-    """Everything that was measured, as valid JSON: a number that is not finite is None.
+    """All results of a comparison as valid JSON: a number that is not finite is None.
 
     ``measures``: the deviation of each candidate from the reference; rows of the ``"reference"`` are its change from rest, its
     recorded forces and its smallest det F. ``doubts``: the reasons to doubt the reference, in words. ``from_rest``: the change from
-    rest of every run, with its forces. ``error_bars``: error bars of the reference; ``rankings``: solvers that the error bars
-    distinguish; both are empty without error bars. ``unsound``: the reasons why frames of candidates are not valid.
+    rest of every run, with its forces. ``error_bars``: error bars of the reference; ``rankings``: solvers in order of each
+    measure; both are empty without error bars. ``unsound``: the reasons why frames of candidates are not valid.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]

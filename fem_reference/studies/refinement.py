@@ -166,7 +166,7 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
 def solutions[C: DrivenCase](
     bench: Bench[C], reference: Run, larger: Bench[C], first: str, ratio: float, *, model: bool
 ) -> dict[str, tuple[Bench[C], Run]]:
-    """Benches and runs, by name: of the case on ``larger`` tetrahedra, by the name ``first``; of the same case with each of the
+    """Benches and runs, by name: of the case on ``larger`` tetrahedra, under the name ``first``; of the same case with each of the
     other sources of error halved; and, with ``model``, of the same case with exact attachments, NaN if it cannot be set up.
 
     ``ratio``: the size of the larger tetrahedra divided by the size of those of the ``reference``.

@@ -125,7 +125,7 @@ class Hard(Record):
     solvers that the case is about, by default all; ``because``: the reason. ``no_solution``: the reason why no equilibrium exists;
     a run should then end with a status other than ``converged``. ``contrast``: the defect that the case demonstrates; a run should
     then violate a bound. ``by_effects``: the case depends on its effects and does not apply to solvers that simulate none.
-    ``settings``: changes to a solver's usual settings, which are mostly those for Table 5.1. ``steps``: see ``StepCounts``.
+    ``settings``: by solver, changes to its usual settings (mostly those of the report's Table 5.1). ``steps``: see ``StepCounts``.
     """
 
     title: str
