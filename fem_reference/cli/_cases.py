@@ -71,8 +71,8 @@ def own_candidates(case: Case) -> list[tuple[Candidate, str]]:
 def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
     """The candidate that ``text`` names, and the key or option that chooses it.
 
-    ``text`` is the name of a candidate of the case, a folder of recorded frames, or the name of a solver, which has the settings of
-    the case or else those of the page table-5-1.
+    ``text`` is the name of a candidate of the case, a folder of recorded frames, or the name of a solver, which has its settings
+    in the case or else those for Table 5.1 of the report.
     """
     names = [candidate.name for candidate in case.candidate]
     if text in names:

@@ -24,7 +24,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fit parameters on the quick size of a case, which ``--set`` overrides. The exit status is 1 if a parameter is not determined,
+    """Fit parameters at the quick size of a case, which ``--set`` overrides. The exit status is 1 if a parameter is not determined,
     the law does not fit the data or the fit has not converged, and 3 if a run that the fit needs has failed.
     """
     scene = muscle_case(options.case, options, quick=True)

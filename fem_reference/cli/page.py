@@ -71,7 +71,7 @@ def _examples(options: argparse.Namespace) -> int:
 
 
 def _table(options: argparse.Namespace) -> int:
-    """Measure the kinds of solvers in the report's table, and write the page."""
+    """Compare the kinds of solvers in the report's Table 5.1, and write the page."""
     scenes = {scene.name: scene for scene in _scenes(options, table_5_1.SCENARIOS)}
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:

@@ -35,7 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Recommend a setting or, without limits, answer the usual requests to studies; exit status 1 if no setting meets a request."""
+    """Recommend a setting or, without limits, answer the usual requests; exit status 1 if no setting meets a request."""
     scene, metric = casefile.muscle(scene_of(options)), options.metric
     studies = cost.stored(out(options))
     units = {name: unit for study in reversed(studies) for name, unit in study.units.items()}

@@ -26,7 +26,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure all problems with known answers, or the named ones."""
+    """Measure the errors of all problems with known answers, or of the named ones."""
     from fem_reference.verification.lab import lab  # loads the solvers
 
     catalogue = runner.entries()

@@ -1,4 +1,4 @@
-"""Self-contained pages, and the same numbers as JSON and CSV. No number is computed in this package.
+"""Self-contained pages, with their numbers also as JSON and CSV. No number is computed in this package.
 
 Each kind of page has a module, whose function ``page`` makes the record that :func:`write` writes.
 """

@@ -26,7 +26,7 @@ MOST_CURVES = 8
 def page(versions: Versions, setup: Setup) -> Page:
     """The page of two versions of a solver on a case with this ``setup``."""
     current = versions.current
-    # Pictures of the frame with the maximum change (before, now and the change, on one colour scale), or the missing software.
+    # Pictures of the frame with the maximum change (before, now and the change, on one scale), or the reason why there are none.
     run, found = current.candidate, versions.place
     known = [one for one in versions.changes if one.word != "no number"]  # the greatest changes first
     shown = gallery.figures(setup, run.surface, _shots(versions, found[0])) if found and run.has_surface else ([], "")

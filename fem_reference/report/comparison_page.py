@@ -85,8 +85,8 @@ def _contents(comparison: Comparison) -> dict[str, Any]:
 
 
 def widest(bar: ErrorBar, measure: Measure | None) -> int:
-    """The index of the frame with the widest ``bar``. Only frames in which the ``measure`` of the reference has a value count (a
-    moment arm has no value without a force); an unknown bar in one of these frames counts as the widest.
+    """The index of the frame with the widest ``bar``. Frames without a value of the reference's ``measure`` are ignored (a moment
+    arm has no value without a force); an unknown bar in any other frame counts as the widest.
     """
     if measure is None or not np.isfinite(measure.values).any():
         return bar.widest

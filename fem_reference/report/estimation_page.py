@@ -40,7 +40,7 @@ def page(found: Estimation) -> Page:
 
 
 def said(found: Estimation) -> str:
-    """Sentences on the best technique for fibres and on the accuracy of Gaussians, if they were measured."""
+    """Sentences on the best technique for fibres and on the accuracy of Gaussians, if these were computed."""
     sentences = list[str]()
     if found.curves:  # empty if no fibre has enough points
         errors = {name: np.mean([one.rms for one in found.curves if one.technique == name]) for name in TECHNIQUES}

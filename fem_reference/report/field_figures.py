@@ -32,7 +32,7 @@ _MARKERS = "xd+s^v"
 
 
 def rival(example: Comparison) -> Run | None:
-    """The run that is compared with the reference: the listing or, without one, the first candidate."""
+    """The run that is compared with the reference: the listing of the report or, without one, the first candidate."""
     listings = [run for run in example.candidates if run.solver == "listing"]
     return next(iter([*listings, *example.candidates]), None)
 

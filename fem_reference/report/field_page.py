@@ -44,7 +44,7 @@ def _contents(examples: tuple[Comparison, ...]) -> dict[str, Any]:
 
 
 def _section() -> dict[str, list[dict[str, str]]]:
-    """The tables of the file about section 4.6 of the report.
+    """The tables of the file ``octave_section.toml``, which is about section 4.6 of the report.
 
     Each ``difference`` has the ``section``, the ``text``, the ``listing`` and the ``measured`` effect. Each ``figure`` has its
     ``case`` and its ``caption``; the pictures of the report are not distributed.
@@ -53,7 +53,7 @@ def _section() -> dict[str, list[dict[str, str]]]:
 
 
 def apart(example: Comparison) -> str:
-    """A sentence on the difference at the vertices between the listing (without one, the first candidate) and the equation."""
+    """A sentence on the difference at the vertices between the listing (or first candidate) and the solution of the equation."""
     other, reference = field_figures.rival(example), example.reference
     if other is None:
         return "there is only a reference, and no candidate."

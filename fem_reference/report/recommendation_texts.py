@@ -35,7 +35,7 @@ def facts(found: Recommendation, metric: str) -> dict[str, object]:
 
 def text(found: Recommendation, case: str, metric: str, unit: str, limit: float) -> str:
     """The recommended setting or, if no setting meets the request, the nearest setting; with its error, its time and the evidence.
-    ``limit``: the requested limit of the error; ``unit``: the unit of both.
+    ``limit``: the requested limit of the error; ``unit``: the unit of errors.
     """
     alike = "the studied case" if len(found.of) == 1 else "the studied cases"
     measured = "measured on it" if found.measured else f"expected from {listed(list(found.of))}, {alike} most like it"

@@ -53,7 +53,7 @@ def text(check: Check) -> str:
 
 
 def markdown(check: Check) -> str:
-    """A heading with the verdict, both answers, the notes, and a table of at most ``MOST_ROWS`` judgements, the worst first."""
+    """A heading with the verdict, the answers to both questions, notes, and at most ``MOST_ROWS`` judgements, the worst first."""
     shown = check.judgements[:MOST_ROWS]
     lines = [f"### {check.word}: {_escaped(check.candidate)} on {_escaped(check.case)}", ""]
     lines += [f"- {_escaped(line)}" for line in (*_answers(check), *_notes(check))]

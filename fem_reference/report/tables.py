@@ -22,7 +22,7 @@ COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 # The columns of the first table: metric, statistic, heading of the group, heading of the column, unit.
 DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in described("table").items())
 
-# Measured with the same springs at points of the surface and over facets of tetrahedra, on two hip muscles (gluteus_medius and
+# Computed with the same springs at points of the surface and over facets of tetrahedra, on two hip muscles (gluteus_medius and
 # gluteus_maximus) at 1 rad.
 SPREAD = (
     "Attachments are springs, and 5 to 9 % of a force or moment depend on how the same springs are spread over them (5.3 and "
@@ -31,12 +31,12 @@ SPREAD = (
 
 
 def summary(comparison: Comparison) -> dict[str, Any]:
-    """Everything that was measured, as valid JSON: a number that is not finite is None.
+    """All results of a comparison as valid JSON: a number that is not finite is None.
 
     ``measures``: the deviation of each candidate from the reference; rows of the ``"reference"`` are its change from rest, its
     recorded forces and its smallest det F. ``doubts``: the reasons to doubt the reference, in words. ``from_rest``: the change from
-    rest of every run, with its forces. ``error_bars``: error bars of the reference; ``rankings``: solvers that the error bars
-    distinguish; both are empty without error bars. ``unsound``: the reasons why frames of candidates are not valid.
+    rest of every run, with its forces. ``error_bars``: error bars of the reference; ``rankings``: solvers in order of each
+    measure; both are empty without error bars. ``unsound``: the reasons why frames of candidates are not valid.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]

@@ -1,4 +1,4 @@
-"""The 3D view of the page: every frame of every run, packed into the page with the library that draws the view in a browser.
+"""The 3D view of a comparison: every frame of every run, packed into the page with the library that draws it in a browser.
 
 ``viewer.js`` unpacks a JSON object. Arrays in this object are little-endian, compressed (gzip) and encoded in base64:
 

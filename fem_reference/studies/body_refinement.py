@@ -1,4 +1,4 @@
-"""Error bars of bodies from one more accurate solution, with quadratic elements or on cells of half the size."""
+"""Error bars of bodies, from a more accurate solution with quadratic elements or on cells of half the size."""
 
 import logging
 

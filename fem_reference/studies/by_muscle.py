@@ -15,7 +15,7 @@ from fem_reference.scenes.case import Candidate, Case
 from fem_reference.studies import judging, muscle_bars
 from fem_reference.studies.execution import Bench
 
-# A remark on candidates, for pages of several muscles.
+# A remark on candidates, for pages about several muscles.
 ALONE = "Each candidate solves each muscle by itself, without the other muscles."
 
 

@@ -34,7 +34,7 @@ def calibrate_case(
 ) -> Calibration:
     """Fit parameters of a muscle case to measurements. Each trial solves the reference on the mesh of the case.
 
-    ``data``: path of a CSV file with the columns ``frame,quantity,value,unit,sd``; the page on unknown parameters describes them.
+    ``data``: path of a CSV file with the columns ``frame,quantity,value,unit,sd``; docs/uncertainty.md describes them.
     ``fit``: the keys of the parameters to fit, such as ``"effect[0].mu"``. Each parameter must have a range.
 
     The returned ``Calibration`` has one entry in ``estimates`` for each parameter: the ``parameter``, the fitted ``value`` and the

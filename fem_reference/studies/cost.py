@@ -28,11 +28,11 @@ from fem_reference.studies.variations import TETRAHEDRA, Trial, candidate_trials
 
 log = logging.getLogger(__name__)
 
-# The metrics of every point of the study; the joint moment is measured only for solvers with forces.
+# The metrics of every point of the study; the joint moment is computed only for solvers that provide forces.
 METRICS = (*in_tables(), "joint_moment")
 # Surface solvers also run on 4**power times as many triangles; these surfaces are stored with the runs.
 _POWERS = (-1, 1)
-_MOST_TRIANGLES = 20_000  # with more triangles a run takes minutes, most of a study's time
+_MOST_TRIANGLES = 20_000  # with more triangles a run takes minutes, which would be most of a study's time
 SURFACES = "surfaces"
 FILE = "study.json"
 # The number of coarser runs of the reference, starting with the finest, whose error bars are compared with true errors.
@@ -126,7 +126,7 @@ def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
 
 
 def settings_of(trial: Trial) -> dict[str, object]:
-    """The settings of a trial that differ from the defaults of its solver, and the hash of a program."""
+    """The settings of a trial that differ from the defaults of its solver, and the hash of the program that it runs, if any."""
     given = trial.choice.settings
     try:
         own = solvers.settings(trial.choice, trial.name)

@@ -1,4 +1,4 @@
-"""Best fits of laws to measurements of cubes, which show how well each law can match them; the shipped material is not a fit."""
+"""Best fits of laws to measurements of cubes of muscle, to show how well each law can match them. No shipped case uses a fit."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 
 Parameters = Mapping[str, tuple[float, tuple[float, float] | None]]
-_STEP = 1e-4  # the difference step of a parameter's logarithm, far above the error of root finding, 1e-8
+_STEP = 1e-4  # the step of finite differences in a parameter's logarithm, far above the error of root finding, 1e-8
 _MOST = 100  # the maximum number of evaluations of a fit; these fits converge within 30
 _SHEAR = SHIPPED[0].parameters[0][1]
 
@@ -28,8 +28,8 @@ class _Ended:
 
 
 def shipped_law() -> Fitted:
-    """Fit the shipped law to the cubes of Van Loocke et al. Only the shear modulus of the matrix is fitted, because ratios of
-    stresses do not change if fibres and matrix are scaled together.
+    """Fit the shipped law to the measurements of Van Loocke et al. Only the shear modulus of the matrix is fitted, because ratios
+    of stresses do not change if fibres and matrix are scaled together.
     """
     to = [one for one in QUANTITIES if one.experiment == LOOCKE and not one.is_order]
     ended = _fitted(lambda values: _shipped(*values), to, (_SHEAR,))
@@ -41,8 +41,8 @@ def shipped_law() -> Fitted:
 
 
 def collagen_law(most: int = _MOST) -> Fitted:
-    """Fit the law with collagen across the fibres to all quantities except rankings, which have no slope. ``most``: the maximum
-    number of evaluations. Only the fibres have a published range, as we know of no publication with ``k1`` and ``k2`` of this law.
+    """Fit the law with collagen across the fibres to all quantities except rankings, which have no derivative. ``most``: the
+    maximum number of evaluations. Only the fibres have a published range, as we know of no published ``k1`` and ``k2`` of this law.
     """
     to = [one for one in QUANTITIES if not one.is_order]
     ended = _fitted(lambda values: with_collagen(*values), to, (FIBRES["stress"] / 2, 0.1, 10.0), most)

@@ -3,7 +3,7 @@
 dataset.json               version, splits, the SHA-256 of every other file, and scenes that were left out, with the reason
 datacite.json              metadata in DataCite's schema 4.6
 load.py                    a loader that needs only numpy
-scenes/NAME/case.toml      the case, which ``fem-reference run scenes/NAME`` solves, and muscle.ply; neither for shipped cases
+scenes/NAME/case.toml      the case, which ``fem-reference run scenes/NAME`` solves, and muscle.ply; shipped cases lack both
            /frames.npz     the arrays of :func:`arrays`
            /bars.json      error bars of every statistic in each frame, and doubts, such as a small det F at an attachment's rim
 """
@@ -211,7 +211,7 @@ def _inside(run: Run, case: MuscleCase) -> Arrays:
 
 
 def splits(found: dict[str, Arrays], seed: int) -> dict[str, dict[str, dict[str, list[int]]]]:
-    """Rows of frames by scene, for the parts ``train`` and ``test`` of two splits.
+    """Indices of frames by scene, for the parts ``train`` and ``test`` of two splits.
 
     ``pose``: frames of a scene with equal poses are in the same part, and rest is in ``train``. ``shape``: all scenes with the same
     shape of muscle are in the same part.

@@ -9,8 +9,8 @@ import numpy as np
 
 
 def load(folder: str | Path, split: str = "pose", part: str = "train") -> list[tuple[dict[str, np.ndarray], list[int]]]:
-    """Load the scenes in a ``part`` ("train" or "test") of a ``split`` ("pose" or "shape"), each as its arrays by name and the rows
-    of frames that belong to the part. Raises ValueError if a file of the data set was changed.
+    """Load the scenes in a ``part`` ("train" or "test") of a ``split`` ("pose" or "shape"), each as its arrays by name and the
+    indices of the frames that belong to the part. Raises ValueError if a file of the data set was changed.
     """
     index = json.loads((Path(folder) / "dataset.json").read_text(encoding="utf-8"))
     for name, known in index["sha256"].items():

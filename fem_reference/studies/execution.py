@@ -125,8 +125,8 @@ class Bench[C: Case]:
         """Raise InputError if the settings of a solver do not suit the case.
 
         The settings of the reference, of the ``chosen`` solvers and of the candidates of the case are checked, except candidates
-        with recorded frames, which may not exist yet. Only if a run has to be solved, the recorded frames of chosen candidates
-        are read and the problem is checked.
+        with recorded frames, which may not exist yet. The recorded frames of chosen candidates are read, and the problem is
+        checked, only if a run has to be solved.
         """
         if self.scene.parts:
             self.settings(self.scene.reference, "reference")
@@ -222,7 +222,7 @@ class Bench[C: Case]:
         return ("converged", "denied", *(("stopped",) if self._watched(solver) else ()))
 
     def _checked(self, run: Run) -> Run:
-        """The ``run``, with a second check (stored with the run) if a solver that models effects solved muscles."""
+        """The ``run``, with a second check (stored with the run) if the case is of muscles and the solver models effects."""
         asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
         if not asked or run.outcome.status not in ("converged", "denied"):
             return run

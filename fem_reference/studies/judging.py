@@ -73,7 +73,7 @@ def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Convergence]:
         if exact is not None:
             return l2_distance(built.mesh, values, partial(scalar.at, exact))
         # The vertices of a mesh come first in every finer mesh. The error is taken over all vertices of this mesh: at those of an
-        # irregular coarsest mesh alone it would converge with h^2 log h, not with h^2.
+        # irregular coarsest mesh alone it would converge like h^2 log h, not like h^2.
         count = len(built.mesh.points)
         return float(np.sqrt(np.mean((values[:count] - truth[:count]) ** 2)))
 

@@ -23,7 +23,7 @@ from fem_reference.studies.execution import Bench
 LAW = ("neo_hooke", "incompressible", "incompressible_penalty", "mooney_rivlin")
 PARTS = ("left out", "law", "mesh", "convergence")
 # The shear modulus, as a fraction of the bulk modulus, that is added to a law without shear stiffness at rest, whose equilibrium is
-# not unique. It moves the end of a bar that rotates by 1 rad by 0.02 mm; with a tenth of it, Newton's method may not converge.
+# not unique. It displaces the end of a bar by 0.02 mm in a rotation of 1 rad; with a tenth of it, Newton's method may not converge.
 _WEAK = 1e-4
 
 
@@ -54,7 +54,7 @@ def lame(case: MuscleCase, poisson: float) -> tuple[float, float]:
 
 
 def split(bench: Bench[MuscleCase], run: Run, law: Effect, takes: Collection[str] = ()) -> Split:
-    """Split the error of a ``run`` into parts. The solver has a ``law``, linear tetrahedra of the case and exact attachments.
+    """Split the error of a ``run`` into parts. The solver has ``law``, the case's tetrahedra (linear), and exact attachments.
 
     ``takes``: other effects that the solver models. Raises InputError if an intermediate reference has no solution.
     """

@@ -131,7 +131,7 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
     except OvertimeError as why:
         outcome = Outcome("timed out", str(why))
     processor, cost = time.process_time() - began, outcome.cost
-    # Compilation does not count; everything else takes at most as much processor time as clock time.
+    # Compilation does not count: the processor time is limited to the clock time of set-up and solution.
     if "seconds_compile" in cost:
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
     load = clock.load()

@@ -22,7 +22,7 @@ from fem_reference.studies.execution import Bench
 LARGER = 1.25  # a second run with tetrahedra larger by this factor shows the dependence of moment arms on the mesh
 _EVERY, _RAD = 10, 100  # the difference of successive frame numbers, and of those before and after a rotation by 1 rad
 NEMETH, BLEMKER = "nemeth_1985", "blemker_delp_2005"
-# Ranges of flexion [rad]: that of the shipped cases, and about -10 to 90 degrees, which ends where a reference does not converge.
+# Ranges of flexion [rad]: that of the shipped cases, and about -10 to 90 degrees; a run that fails to converge ends earlier.
 SHIPPED, WIDE = (0.0, 1.0), (-0.2, 1.6)
 _FARTHEST = 1.0  # the flexion [rad] that a run must reach
 
@@ -135,7 +135,7 @@ def published(scene: MuscleCase, experiment: str, muscle: str) -> ArmRange:
 
 
 def _envelope(rows: list[dict[str, str]], muscle: str) -> ArmRange:
-    """The range [mm] of moment arms from the ``rows`` of a file in cm, at all angles of either bound that both bounds cover."""
+    """The range [mm] of moment arms from the ``rows`` of a file in cm, at the angles of both bounds within their common range."""
     sides = {}
     for bound in ("lower", "upper"):
         side = [row for row in rows if (row["muscle"], row["bound"]) == (muscle, bound)]

@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 def check(bench: Bench[Case]) -> None:
-    """Raise InputError if a case that has to be solved cannot have error bars, because larger tetrahedra cannot be set up."""
+    """Raise InputError if a case has to be solved but cannot have error bars, as it cannot be set up with larger tetrahedra."""
     if store.finished(bench.folder(bench.scene.reference, "reference")):
         return  # nothing that takes long comes before its bars
     if bench.scene.parts:
@@ -35,7 +35,7 @@ def check(bench: Bench[Case]) -> None:
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> dict[str, ErrorBars]:
     """The error bars of each muscle by name, from stored or new runs of all muscles; they are stored with the ``reference``.
-    With ``model``, also the change by exact attachments. Empty for a run that did not converge.
+    With ``model``, also the change due to exact attachments. Empty for a run that did not converge.
     """
     if reference.outcome.status != "converged":
         log.info("no error bars: the reference did not converge")

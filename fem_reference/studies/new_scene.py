@@ -61,7 +61,7 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
 
     ``muscle`` and ``bones`` are files of triangles. The muscle is attached to the two bones nearest to it, of which the second
     moves. ``unit``: the unit of all files, one of ``LENGTH_UNITS``. If it is None, the unit is guessed: the only one that gives
-    muscle and bones a usual length. Raises InputError, which names the unusable file or the value that cannot be guessed.
+    muscle and bones a usual length. Raises InputError if a file is unusable or a value cannot be guessed.
     """
     if len(bones) < 2:
         raise InputError("--bone", f"{len(bones)} files", "two or more, which the muscle connects")

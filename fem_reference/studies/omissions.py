@@ -208,7 +208,7 @@ def _omission(one: Made, left_out: tuple[str, ...]) -> Omission:
 
 
 def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:
-    """The displacement of the surface due to the only effect left out, estimated by its indicator; empty for other parts."""
+    """The displacement of the surface due to the effect left out, estimated by its indicator; empty unless it is just one."""
     if len(part.effects) != 1:
         return {}
     (left_out,) = part.effects.values()

@@ -45,7 +45,7 @@ pennation = "{:.4g} deg\""""
 
 
 def shape(rng: np.random.Generator) -> tuple[Surface, float]:
-    """A closed surface along z, and its length [mm]. It has elliptical sections, and flat ends at z = 0 and at its length."""
+    """A closed surface along z, and its length [mm]. It has elliptical sections, and flat ends at z = 0 and z = length."""
     length, wide = rng.uniform(50, 110), rng.uniform(9, 16)
     flat, first, last = rng.uniform(0.55, 1), rng.uniform(0.5, 0.95), rng.uniform(0.5, 0.95)
     belly, bow = rng.uniform(0.35, 0.65), rng.uniform(0, 0.1) * length

@@ -55,7 +55,7 @@ MAKING = (*map(Path, _OF_BARS), *map(Path(__file__).with_name, ("muscle_bars.py"
 # tetrahedra larger by the first of these factors with which it can be set up.
 RATIOS = (1.5, 1.25)
 _AT_ONCE = 2  # runs for error bars that are solved at a time, if there are as many cores
-# Without a request, error bars are computed only if they take at most this share of the reference's time, as estimated.
+# Without a request, error bars are computed only if their estimated time is at most this fraction of the reference's time.
 CHEAP = 0.2
 
 
@@ -63,8 +63,8 @@ def variations[C: DrivenCase](
     case: C, settings: Record, *, pressed: bool = True, touched: bool = True
 ) -> dict[str, Vary[C]]:
     """Changes, by name, each of which halves a source of numerical error other than tetrahedra: compliance and smoothing of contact
-    with bones, if any ``pressed``, and of muscles with themselves or each other, if any ``touched``; error and rounding of
-    distances to bones; load steps, if the ``settings`` have them and a state depends on them: with drag, viscosity or friction.
+    with bones (if ``pressed``) and of muscles with themselves or each other (if ``touched``); error and rounding of distances to
+    bones; load steps, if the ``settings`` have them and a state depends on them: with drag, viscosity or friction.
     """
     found, bones = dict[str, Vary[C]](), among(case.effects) if pressed else None
     of_muscles = touching.among(case.effects) if touched else None
@@ -84,7 +84,7 @@ def variations[C: DrivenCase](
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars | None:
     """The error bars of the ``reference`` of a bench, from runs in the store or solved now; they are stored with the reference.
-    With ``model``, also the change by exact attachments. None for a run that did not converge or has no interior.
+    With ``model``, also the change due to exact attachments. None for a run that did not converge or has no interior.
     """
     if reference.outcome.status != "converged" or reference.fibres is None or not reference.has_surface:
         log.info("no error bars: the reference did not converge or has no interior")
@@ -126,7 +126,7 @@ def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | N
 
 
 def stored(reference: Run, muscle: str = "") -> ErrorBars | None:
-    """The error bars stored with a reference run, of one ``muscle`` of several; None without bars of this run and metrics."""
+    """The error bars stored with a reference run, of one ``muscle`` of several; None if there are none by the current metrics."""
     if reference.folder is None:
         return None
     folder = reference.folder / muscle
@@ -166,8 +166,8 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
 def solutions[C: DrivenCase](
     bench: Bench[C], reference: Run, larger: Bench[C], first: str, ratio: float, *, model: bool
 ) -> dict[str, tuple[Bench[C], Run]]:
-    """Benches and runs, by name: of the case on ``larger`` tetrahedra, by the name ``first``; of the same case with each other
-    source of error halved; and, with ``model``, of the same case with exact attachments, NaN if it cannot be set up.
+    """Benches and runs, by name: of the case on ``larger`` tetrahedra, under the name ``first``; of the same case with each of the
+    other sources of error halved; and, with ``model``, of the same case with exact attachments, NaN if it cannot be set up.
 
     ``ratio``: the size of the larger tetrahedra divided by the size of those of the ``reference``.
     """
@@ -225,7 +225,7 @@ def check_coarser(bench: Bench[MuscleCase], fine: float, coarse: float) -> None:
 
 def safety(bench: Bench[MuscleCase]) -> float:
     """The factor of safety: that of a grid convergence index, times the ratio of the size of the unrefined tetrahedra to the radius
-    of the smallest attachment if it is above 1. Nested tetrahedra share the polygonal outline of an attachment, so their
+    of the smallest attachment, if this ratio is above 1. Nested tetrahedra share the polygonal outline of an attachment, so their
     difference does not show its error.
     """
     surface, attached = bench.setup().surface, bench.setup().attached
@@ -236,7 +236,7 @@ def safety(bench: Bench[MuscleCase]) -> float:
 
 def coarser[C: DrivenCase](bench: Bench[C]) -> tuple[Bench[C], float]:
     """A bench of the case with larger tetrahedra in every muscle, and the ratio of the sizes: the same for all, as errors of one
-    muscle reach its neighbours. If all muscles are refined, the last refinement is left out. InputError if no case can be set up.
+    muscle reach its neighbours. If all are refined, the last refinement is left out. Raises InputError if no case can be set up.
     """
     case, failed = bench.scene, list[InputError]()
     if all(one.refinements for one in muscles_of(case)):
@@ -267,9 +267,9 @@ def reported(name: str) -> Iterator[None]:
 
 
 def _solved[C: DrivenCase](other: Bench[C], name: str, reference: Run) -> tuple[Bench[C], Run]:
-    """The bench of a changed scene, and its run over the frames of ``reference``: NaN if not reached or if the run is denied."""
+    """The bench of a changed scene, and its run over the frames of ``reference``; NaN if not reached or not trusted."""
     case = other.scene
-    # Of several muscles the second check needs states, to check curved facets.
+    # For several muscles the second check needs states, to check curved facets.
     choice = case.reference if case.parts else without_states(case.reference)
     with reported(name):
         run = other.obtain(f"reference, {name}", choice, "reference")
@@ -293,6 +293,6 @@ def _measuring_hash() -> str:
 
 
 def tets(run: Run, fact: str = "tets") -> float:
-    """The number of tetrahedra of a run by the name of the ``fact``, NaN if it is not stated."""
+    """The number of tetrahedra of a run, as stated under the name ``fact``; NaN if it is not stated."""
     found = run.origin.get("mesh", {}).get(fact)
     return found if isinstance(found, float | int) else math.nan

@@ -39,7 +39,7 @@ TIME_LIMIT = 600.0
 THEIRS = "as stated by its authors"
 # The return of solvers to rest is measured only if the reference is within this distance [mm] (rms) of rest in the last frame.
 _BACK = 0.1
-# The metrics of all rows; the joint moment is measured only for solvers with forces.
+# The metrics of all rows; the joint moment is computed only for solvers that provide forces.
 _METRICS = (*in_tables(), "joint_moment")
 
 

@@ -96,7 +96,7 @@ def _on(
 
 
 def chosen(case: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Candidate, str]]:
-    """The solvers that are measured on a case, in the order of ``rows``: the kind, the candidate, and the place that chooses it."""
+    """The solvers that are compared on a case, in the order of ``rows``: the kind, the candidate, and the place that chooses it."""
     found = list[tuple[str, Candidate, str]]()
     for row in rows:
         for i, candidate in enumerate(case.candidate):

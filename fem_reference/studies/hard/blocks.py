@@ -26,7 +26,7 @@ from fem_reference.studies.hard.records import FACES, FIRST, Face, Hard, Hold, L
 
 # The default material of blocks: the usual matrix material of muscle.
 MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible", bulk="10 MPa"))
-_LINES, _POINTS = 4, 9  # the number of measured lines of each block, and of points of each line
+_LINES, _POINTS = 4, 9  # the number of measured lines in each block, and of points on each line
 # The bones of held faces are spheres far from the block; their radius and distance are relative to the size of the block.
 _BALL, _AWAY = 0.01, 50.0
 _SAME = 1e-9  # the maximum rounding difference between equal motions of two holds, relative to the block's size
@@ -132,10 +132,10 @@ def _placed(block: Lattice, nodes: Ints) -> Floats:
 
 
 def _rounded(unit: Floats, share: float) -> Floats:
-    """Move the points ``unit`` (n, 3) of the cube from -1 to 1 towards the unit ball by the fraction ``share`` of their way.
+    """Move points ``unit`` (n, 3) of the cube from -1 to 1 by the fraction ``share`` of the way to their images in the unit ball.
 
-    A coordinate x becomes ``x (1 - y^2/2 - z^2/2 + y^2 z^2/3)^(1/2)``, where y and z are the other two coordinates. This maps the
-    surface of the cube onto the unit sphere.
+    The image of a coordinate x is ``x (1 - y^2/2 - z^2/2 + y^2 z^2/3)^(1/2)``, where y and z are the other two coordinates. This
+    maps the surface of the cube onto the unit sphere.
     """
     y, z = (np.roll(unit, -turn, axis=1) ** 2 for turn in (1, 2))
     return np.asarray(unit * (1 - share + share * np.sqrt(1 - y / 2 - z / 2 + y * z / 3)))

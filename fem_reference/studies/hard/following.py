@@ -1,4 +1,4 @@
-"""Runs of hard cases, whose frames are measured for their health, and repetitions with other load steps and on other meshes."""
+"""Runs of hard cases, with their frames for measures of health; and repetitions with other load steps or on other meshes."""
 
 import time
 from collections import Counter
@@ -34,7 +34,7 @@ Solve = Callable[[Hard], tuple[Outcome, Followed]]
 
 
 class StalledError(Exception):
-    """Raised if the machine was too busy to draw a conclusion about a run."""
+    """Raised if the machine was too busy for a conclusion about a run."""
 
 
 def check_not_stalled(outcome: Outcome) -> None:
@@ -124,8 +124,8 @@ def farthest(followed: Followed) -> StepCounts | None:
 
 
 def in_steps(built: MechanicalProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
-    """Solve the reference up to a frame in several numbers of equal load steps, and compare the end states. The standard is the
-    end state with the largest number of steps that reached the frame.
+    """Solve the reference up to a frame with several numbers of equal load steps. Compare the end states with that of the largest
+    number of steps with which the frame was reached.
     """
     ends, words, span = dict[int, Floats](), list[str](), steps.until - built.frames[0]
     for count in steps.counts:
@@ -164,7 +164,7 @@ def _shaken(block: Lattice, number: int) -> Lattice:
 
 
 def on_meshes(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solve) -> SameEnd:
-    """Solve a case on ``count`` jittered meshes by the function ``solve``, and compare the statuses, and the positions in common
+    """Solve a case on ``count`` jittered meshes with the function ``solve``, and compare the statuses, and the positions in common
     frames, with those of the ``first`` run.
     """
     begin, elsewhere, outcome, followed = time.process_time(), 0.0, *first

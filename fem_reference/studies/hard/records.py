@@ -41,8 +41,8 @@ class Lattice(Record):
 
     ``grading``: the ratio of the length of the last cell to that of the first, along each axis. ``jitter``: the maximum random
     displacement of nodes, in cell sizes; nodes on faces and edges stay on them. ``seed``: the seed of the random displacements.
-    ``rounding``: 0 for a block; values close to 1 turn it into an ellipsoid. ``fibre``: the direction of fibres and of the measured
-    lines. ``points_apart`` [mm]: the spacing of the points for contact and springs, by default the same as on muscles.
+    ``rounding``: 0 for a block; values close to 1 turn it into an ellipsoid. ``fibre``: the direction of fibres; measured lines
+    follow the nearest axis. ``points_apart`` [mm]: the spacing of points for contact and springs, by default as on muscles.
     """
 
     size: Point
@@ -88,7 +88,7 @@ class Start(Record):
     """A state at the first frame that replaces the rest state.
 
     ``random``: points are displaced at random by up to ``amount`` cell sizes. ``point``: the body is collapsed to its centre.
-    ``plane``: the body is collapsed onto the plane through its centre normal to z. ``inside out``: the body is mirrored at this
+    ``plane``: the body is collapsed onto the plane through its centre normal to z. ``inside out``: the body is reflected in this
     plane.
     """
 
@@ -110,7 +110,7 @@ class Shipped(Record):
 
 
 class StepCounts(Record):
-    """Numbers of equal load steps (``counts``) in which the reference is solved up to frame ``until``. The state at this frame
+    """Numbers of equal load steps (``counts``) with which the reference is solved up to frame ``until``. The state at this frame
     should be the same for every number of steps.
     """
 
@@ -124,8 +124,8 @@ class Hard(Record):
     ``healthy`` describes a healthy run in words; ``bound`` limits its quantities, the decisive quantity first. ``only``: the
     solvers that the case is about, by default all; ``because``: the reason. ``no_solution``: the reason why no equilibrium exists;
     a run should then end with a status other than ``converged``. ``contrast``: the defect that the case demonstrates; a run should
-    then exceed its bound. ``by_effects``: the case depends on its effects and does not apply to solvers that simulate none.
-    ``settings``: for each solver, the settings that differ from those for Table 5.1 of the report. ``steps``: see ``StepCounts``.
+    then violate a bound. ``by_effects``: the case depends on its effects and does not apply to solvers that simulate none.
+    ``settings``: by solver, changes to its usual settings (mostly those of the report's Table 5.1). ``steps``: see ``StepCounts``.
     """
 
     title: str

@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 
 # The minimum time [s] until a limit raises its exception again, long enough for the first exception to end the run.
 _AGAIN = 1.0
-# The limit of processor time [s] if a case is repeated in several numbers of load steps or on several meshes.
+# The limit of processor time [s] if a case is repeated with several numbers of load steps or on several meshes.
 LONGER = 600.0
 # The pattern of a rest position [mm] in messages.
 _PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
@@ -50,8 +50,8 @@ class _Late(Exception):  # noqa: N818 - it is an event in a run, not an error, a
 class Posed:
     """A hard case with its problem, which is made once, and with the positions and frame numbers of the reference (``truth``).
 
-    ``in_steps``: the reference is also solved up to its farthest frame in several numbers of load steps, even if the case does not
-    request this. ``jitters``: the number of jittered meshes on which the reference is also solved.
+    ``in_steps``: the reference is solved again with several numbers of load steps, up to the frame at which it is farthest from its
+    first state, even if the case does not request this. ``jitters``: the number of jittered meshes on which it is solved again.
     """
 
     hard: Hard
@@ -199,7 +199,7 @@ def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
 
 
 def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Followed) -> Iterator[SameEnd]:
-    """Comparisons of the reference's run with runs in other numbers of load steps, and with runs on jittered meshes."""
+    """Comparisons of the reference's end states after different numbers of load steps, and of its run with runs on other meshes."""
     hard, built = posed.hard, mechanical(posed.problem)
     if built is None or choice.solver != REFERENCE:
         return
