@@ -139,7 +139,7 @@ def indentation(lab: Lab, n: int, depth: float, mu: float) -> float:
     return ball_force(lab, n, depth, shipped) / ball_force(lab, n, depth, fitted)
 
 
-# For each depth [mm]: half the difference of the forces at exponents 16 and 28 (reported deviation: 5.7), divided by that at 22.
+# For each depth [mm]: half the difference of the forces at exponents 16 and 28 (reported SD: 5.7), divided by the force at 22.
 _BY_EXPONENT = {0.6: 0.071, 1.2: 0.271}
 _SARCOMERES = find("chen_2016", "sarcomere_length", "110 deg"), find("chen_2016", "sarcomere_length", "50 deg")
 _STRETCH, _SD = ratio(*_SARCOMERES)

@@ -38,7 +38,7 @@ def _step(x: Floats) -> tuple[Floats, Floats]:
 
 
 def facing(here: FacetPlaces, there: FacetPlaces) -> tuple[Floats, Floats]:
-    """The fraction (n,) of the pressure that acts at this cosine between the normals of facing points, and its derivative."""
+    """The fraction (n,) of the pressure that acts, and its derivative with respect to the cosine between the points' normals."""
     share, slope = _step((-np.vecdot(here.normal, there.normal) - GRAZING) / (_FRONTAL - GRAZING))
     return share, slope / (_FRONTAL - GRAZING)
 
@@ -183,7 +183,7 @@ class RayPass(Pass):
         return some[kept], facets[kept], here[np.flatnonzero(kept)]
 
     def _ends(self, at: Floats, gap: Floats, facets: Ints) -> tuple[Floats, Floats, Floats]:
-        """The fraction (n,) of the pressure that acts beyond edges, its derivatives by coordinates (n, 2) and by the gap (n,)."""
+        """The fraction (n,) of the pressure that acts beyond edges; its derivatives with respect to place (n, 2) and gap (n,)."""
         size, (beyond, leaving) = _SHALLOW * self.other.balls(self.other.rest)[1][facets], self.other.leaving(at)
         (wide, by_place), (shallow, by_gap) = _step(1 - beyond / _WIDE), _step(2 + 2 * gap / size)
         out = beyond > _ON
