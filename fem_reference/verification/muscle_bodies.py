@@ -35,7 +35,7 @@ APONEUROSIS, HALF_WIDTH, THIN = 174.0, 32.5, 1.0  # length, half the width and t
 FLEXION = math.radians(110 - 50)
 LENGTH = FIBRE * find("chen_2016", "sarcomere_length", "50 deg").value / OPTIMAL  # of the fibres at 50 degrees [mm]
 ALONG, THICK = LENGTH * math.cos(PENNATION), LENGTH * math.sin(PENNATION)
-# Tendon after Blemker, Pinsky and Delp 2005, recalled: 2.7 MPa (exp(46.4 (stretch - 1)) - 1) to a stretch of 1.03, then linear.
+# Tendon after Blemker, Pinsky and Delp 2005, recalled: 2.7 MPa (exp(46.4 (stretch - 1)) - 1) up to a stretch of 1.03, then linear.
 L1, L2, STRAIGHT = 2.7, 46.4, 1.03
 # Tibialis anterior of a rat: half its length and width, thickness, and the radius of the sphere [mm]; assumed.
 TIBIALIS, BALL = (12.0, 5.0, 6.0), 3.0

@@ -45,7 +45,7 @@ class AssembledBody:
         self.comm, self.reuse, self.effects = MPI.COMM_WORLD, settings.reuse and not body.remembers, body.effects
         changed = (isinstance(one, Energy) and (isinstance(one, Ramped) or not one.stored) for one in self.effects)
         self.conserves = not any(changed)  # True if the energy changes only as the body deforms
-        self.judged = False  # True if the energy gap is judged; if not, a halfway state is not worth its cost
+        self.judged = False  # True if ``path.gap`` is judged; if not, a halfway state is not worth its cost
         self.mesh = meshes.distribute(self.comm, body.mesh)
         count = self.mesh.topology.index_map(3).size_local
         self.cells = np.asarray(self.mesh.topology.original_cell_index, np.int64)[:count]

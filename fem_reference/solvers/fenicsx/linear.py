@@ -7,8 +7,8 @@ from petsc4py import PETSc
 
 from fem_reference.solvers.fenicsx.spent import Spent
 
-# Indices in MUMPS's INFOG: the error, and the number of negative pivots. Indices in its ICNTL: the last front on one process, as
-# its pivots are otherwise not counted; and the memory beyond the estimate, in per cent.
+# Indices in MUMPS's INFOG: the error, and the number of negative pivots. Indices in its ICNTL: factorising the last front on one
+# process, as its pivots are otherwise not counted; and the memory beyond the estimate, in per cent.
 _ERROR, _NEGATIVE, _ROOT_BY_ONE, _MORE_MEMORY = 1, 12, 13, 14
 _FLOPS, _ENTRIES = 3, 29  # index in RINFOG of the operations of a factorisation, in INFOG of the entries of its factors
 # Above this number of unknowns the factors are compressed by blocks (BLR: ICNTL(35)), up to an error of 1e-5 (CNTL(7)). Compression

@@ -16,7 +16,7 @@ from fem_reference.solvers.fenicsx.own_pairs import OwnPairs, pairs
 # the normals of two facets at their common edge are nearest to neither facet.
 _BEYOND = 0.02
 # A point stays on its facet up to this distance beyond the edges, unless another facet is nearer by more than the smoothing: where
-# two facets meet at an angle, Newton's method would go back and forth between them.
+# two facets meet at an angle, Newton's method would otherwise go back and forth between them.
 _STAYS = 0.05
 # The cosine between normals above which a point that slides off a sharp edge is free, as the part faces another way there.
 _FACING = -0.5
@@ -179,7 +179,7 @@ class Pass:
         return np.vecdot(points[some] - middle.point[facets], middle.normal[facets]), bulge
 
     def pressure(self, met: Met) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] on points that ``met`` facets, overlaps at rest subtracted, and its slope with respect to the gap."""
+        """The pressure (n,) [MPa] on ``met`` points, with overlaps at rest subtracted, and its slope with respect to the gap."""
         (whole, slope), shares = self.whole(met), self.shares(met)
         return shares * whole, shares * slope
 
