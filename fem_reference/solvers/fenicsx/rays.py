@@ -24,7 +24,7 @@ _SHALLOW, _NEAR = 0.25, 0.4
 _STAYS = 4.0  # beyond edges, a point stays on its last facet unless another has this many times the pressure
 _ON = 1e-7  # a line meets a facet up to this distance beyond the facet's edges, in reference coordinates
 _AT = 0.02  # the same for the point of a facet that is nearest to a point
-_BENT = 3.0  # the height, in bulges of a facet, up to which it can face a point inside; 2.1 for a bend of 45 degrees
+_BENT = 3.0  # largest height, in bulges of a facet, of a point inside that it may face; 2.1 for a bend of 45 degrees
 _SAME = 1e-6  # two crossings of a line are the same up to this distance [mm]
 # A point is in contact if it has at least this fraction of its pressure, or if its depth beyond the smoothing is at most this many
 # times the depth that belongs to its pressure.
@@ -155,7 +155,7 @@ class RayPass(Pass):
         return Hits(points, own, here[found], facets[found], there[found], gap[found], left[found], shades)
 
     def _hidden(self, nodes: Floats, here: FacetPlaces, gap: Floats) -> Ints:
-        """The hits (k,) that lie behind a nearer crossing of a facet out of reach; ``_lines`` leaves such crossings out."""
+        """The hits (k,) that lie behind a nearer crossing with a facet out of reach; ``_lines`` leaves such crossings out."""
         reach = self._reach(nodes)
         deep = np.flatnonzero(-gap > reach.min())
         if not len(deep):

@@ -26,13 +26,11 @@ class BodySettings(Record):
 
     ``follow``: ``"equilibrium"`` accepts any equilibrium that Newton's method finds. With ``"stable"``, if the equilibrium of a
     frame is unstable (and negative modes are counted), the body is moved along its lowest mode by a ``perturbation``, a fraction of
-    its size, and the frame is solved again. Moves of 1, 2, 4 and 8 times this length, in both directions, are tried until there
-    are fewer negative modes.
-
-    ``reuse``: reuse the state of an earlier frame with the same load. ``time_limit``: the limit on processor time for each rank, by
-    default none; if the wall-clock time exceeds about twenty times this limit, the status is *stalled*, which allows no conclusion.
-    ``store_state``: each frame also stores the unknowns of every cell, from which ``results`` evaluates stress, pressure, det F and
-    fibre stretch; by default only for a muscle whose frames together take at most 64 MB.
+    its size, and the frame is solved again. Moves of 1, 2, 4 and 8 times this length, in both directions, are tried until there are
+    fewer negative modes. ``reuse``: reuse the state of an earlier frame with the same load. ``time_limit``: the limit on processor
+    time for each rank, by default none; if the wall-clock time exceeds about twenty times this limit, the status is *stalled*,
+    which allows no conclusion. ``store_state``: each frame also stores the unknowns of every cell, from which ``results`` evaluates
+    stress, pressure, det F and fibre stretch; by default only for a muscle whose frames together take at most 64 MB.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
@@ -52,7 +50,9 @@ class BodySettings(Record):
 
 
 class Settings(BodySettings):
-    """Numerical settings for a muscle. ``ranks``: the number of MPI processes, by default 2 if two idle cores save time, else 1."""
+    """Numerical settings for a muscle. ``ranks``: the number of MPI processes, by default 2 if that is faster and two cores are
+    idle, otherwise 1.
+    """
 
     ranks: int | None = Field(default=None, gt=0, le=1024)
 

@@ -73,7 +73,7 @@ class TouchingForces:
     @staticmethod
     def _passes(body: Body, form: Form, displacement: Displacement) -> tuple[list[Pass], list[Pass | None]]:
         """Two passes for each law, one from each side (a single one if a part touches itself); and for each pass the skin around
-        the other part, which the points of the pass must not touch. It is None if there is no such skin or it takes part in contact.
+        the other part, which the points of the pass must not touch. It is None without such a skin, or if it takes part in contact.
         """
         both = ((law, dict.fromkeys(((law.one, law.other), (law.other, law.one)))) for law in body.touching)
         sides = [(law, *pair) for law, pairs in both for pair in pairs]
