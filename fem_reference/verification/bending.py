@@ -69,7 +69,7 @@ class Reading(NamedTuple):
 
 
 TRUE = rivlin.Flexure(MU, THICKNESS, LENGTH, ANGLE)
-# The moment on the end per width; the radius of the circle fitted to the nodes of the inner face; the distance of the curved faces.
+# The end moment per unit width; the radius of a circle fitted to the nodes of the inner face; the distance between curved faces.
 READINGS = {
     "moment": Reading("the moment", "N", lambda _, state: float(state.moments["y1"][2] / WIDTH), TRUE.moment),
     "inner radius": Reading(
@@ -88,7 +88,7 @@ READINGS = {
 
 
 def twisted(lab: Lab, rings: int, end: str, element: str, material: tuple[Effect, ...], degree: int = 2) -> float:
-    """The moment [N mm] about the axis on the top of the cylinder, if ``end`` is "moments", or the force [N] along the axis, if
+    """The moment [N mm] on the top of the cylinder about its axis, if ``end`` is "moments", or the force [N] along the axis, if
     ``end`` is "forces".
 
     Both ends are rotated by TWIST times their height and held there. With ``degree`` 1 the cells are straight.
@@ -122,7 +122,7 @@ MIXED = Refinement((1, 2, 3), THICKNESS / 2, order=None, note="no order: the err
 def flexure(
     name: str, reading: str, element: str, wrong: dict[str, Any], error: tuple[float, str], **more: Any
 ) -> Entry:
-    """The entry for a ``reading`` of the bent block; ``error``: the tolerance, and the error with the finest cells in words."""
+    """The entry for a ``reading`` of the bent block; ``error``: the tolerance, and the error with the finest cells, in words."""
     cells, counts = CELLS[element]
     stated: dict[str, Any] = {"refinement": Refinement(counts, THICKNESS / 2, order=4)} | wrong | more
     return Entry(

@@ -25,7 +25,7 @@ LOCKED = 0.5  # the panel locks if its tip reaches less than this fraction of th
 
 
 def _place(unit: Floats) -> Floats:
-    """Map points (n, 3) of the unit cube to the panel [mm], with smaller cells near its four sides for the clamped corners."""
+    """Map points (n, 3) of the unit cube to the panel [mm], with smaller cells near its sides to resolve the clamped corners."""
     x, y = (3 * unit[:, :2] ** 2 - 2 * unit[:, :2] ** 3).T
     weights = np.stack([(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y], axis=1)
     return np.column_stack([weights @ np.array(cook.CORNERS), THICKNESS * unit[:, 2]])
@@ -99,7 +99,7 @@ SMALL_STRAIN = control("small strain, linearly extrapolated from a tiny load", s
 def tip_entry(
     name: str, panel: dict[str, Any], element: str, wrong: dict[str, Any], stiff: tuple[float, str], **more: Any
 ) -> Entry:
-    """The entry for the tip of a ``panel`` with an ``element``; ``stiff``: the tolerance, and the excess stiffness in words."""
+    """The entry for the tip of a ``panel`` with an ``element``; ``stiff``: the tolerance, and the excess stiffness, in words."""
     words, counts = CELLS[element]
     by, order = ("with linear cells", 2) if "1" in element[:2] else ("limited by the singular clamped corners", 1)
     stated = {"refinement": Refinement(counts, HEIGHT, order)} | wrong | more

@@ -15,7 +15,7 @@ from fem_reference.problems.paths import Along
 from fem_reference.verification.parts import SLOW, clamped, control, find, nearest, ramp, resistance, sliding
 
 land = find("land")
-BULK = 100.0  # [MPa], about 1e4 times the stresses: J is 1 within 1e-4 on average
+BULK = 100.0  # [MPa], about 1e4 times the stresses: J is 1 to within 1e-4 on average
 RESIDUAL = 1e-10  # [N, mm3]; the beam carries 2e-5 N
 X = (1.0, 0.0, 0.0)
 APEX = 0.6  # length of the cells at the apex of the contracting ventricle, relative to the uniform mesh
@@ -41,7 +41,7 @@ class Heart:
     active: float = 1.0
 
     def effects(self, number: int, on: str) -> tuple[Effect, ...]:
-        """The effects of problem ``number`` of ``validation.land``, scaled by these factors, with its pressure ``on`` a surface."""
+        """The effects of problem ``number`` of ``validation.land``, scaled by the factors, with its pressure ``on`` a surface."""
         problem = getattr(land, f"PROBLEM_{number}")
         law, tension = problem.law, problem.tension * self.active
         acting = (

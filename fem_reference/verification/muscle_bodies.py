@@ -35,7 +35,7 @@ APONEUROSIS, HALF_WIDTH, THIN = 174.0, 32.5, 1.0  # length, half the width and t
 FLEXION = math.radians(110 - 50)
 LENGTH = FIBRE * find("chen_2016", "sarcomere_length", "50 deg").value / OPTIMAL  # of the fibres at 50 degrees [mm]
 ALONG, THICK = LENGTH * math.cos(PENNATION), LENGTH * math.sin(PENNATION)
-# Tendon after Blemker, Pinsky and Delp 2005, recalled: 2.7 MPa (exp(46.4 (stretch - 1)) - 1) to a stretch of 1.03, then linear.
+# Tendon after Blemker, Pinsky and Delp 2005, recalled: 2.7 MPa (exp(46.4 (stretch - 1)) - 1) up to a stretch of 1.03, then linear.
 L1, L2, STRAIGHT = 2.7, 46.4, 1.03
 # Tibialis anterior of a rat: half its length and width, thickness, and the radius of the sphere [mm]; assumed.
 TIBIALIS, BALL = (12.0, 5.0, 6.0), 3.0
@@ -139,7 +139,7 @@ def indentation(lab: Lab, n: int, depth: float, mu: float) -> float:
     return ball_force(lab, n, depth, shipped) / ball_force(lab, n, depth, fitted)
 
 
-# For each depth [mm]: half the difference of the forces at exponents 16 and 28 (reported deviation: 5.7), divided by that at 22.
+# For each depth [mm]: half the difference of the forces at exponents 16 and 28 (reported SD: 5.7), divided by the force at 22.
 _BY_EXPONENT = {0.6: 0.071, 1.2: 0.271}
 _SARCOMERES = find("chen_2016", "sarcomere_length", "110 deg"), find("chen_2016", "sarcomere_length", "50 deg")
 _STRETCH, _SD = ratio(*_SARCOMERES)

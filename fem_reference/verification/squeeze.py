@@ -1,14 +1,14 @@
 """A block squeezed between smooth plates, to a tenth of its height and back or until it collapses, and between plates to which
 it sticks, until its corners fold over.
 
-Between smooth plates every state is homogeneous. Below half the height this state is unstable, but Newton's method follows it, as a
-structured mesh does not disturb it. On the return path, too large a load step finds another stress-free state, the block rotated by
-half a turn, beyond its planes of symmetry. This state is rejected, as det F falls to 0 on the straight line to it.
+Between smooth plates every state is homogeneous. Below half the height such states are unstable, but Newton's method follows them,
+as a structured mesh does not disturb them. On the return path, too large a load step finds another stress-free state, the block
+rotated by half a turn, beyond its planes of symmetry. This state is rejected, as det F falls to 0 on the straight line to it.
 
 If the bulk modulus is low, there is a height below which no state near the rest volume exists. The isochoric neo-Hookean energy
 favours a smaller volume, which the law ``K/2 (J - 1)^2`` cannot prevent: its pressure is K at most. With free sides the equilibrium
 is ``mu/3 (J/stretch - stretch^2) = K J^(5/3) (1 - J)``. Without ``stretch^2`` this is ``mu/(3 stretch) = K J^(2/3) (1 - J)``, whose
-right side is 0.326 K at most, at J = 2/5. Below a stretch of about mu/K the only state is near ``J = stretch^3``: a block that
+right-hand side is 0.326 K at most, at J = 2/5. Below a stretch of about mu/K the only state is near ``J = stretch^3``: a block that
 has shrunk equally along all axes, without shear and without force on the plate.
 """
 
@@ -51,7 +51,7 @@ def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: 
     are ``growing``, at the ends of both paths.
     """
     path = Affine(NO_GRADIENT, (0.0, 0.0, HEIGHT - 1), ((0.0, 0.0), (1.0, 1.0), (2.0, 1 - back)))
-    # Newton's method solves for every state, on the return path too.
+    # Without reuse, Newton's method solves for every state, even on the return path.
     solved = plated(lab, element, bulk, path, frames(2, 2 if growing else 2 * STEPS), first_step=0.05, reuse=False)
     return (*solved.states[:-1], solved.last)
 
@@ -165,7 +165,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="1",
         measure=outside,
         given={"element": "Q1/P0", "poisson": POISSON},
-        **control("a Poisson ratio of 0.32", poisson=0.32),  # with which the volume stays above a half
+        **control("a Poisson ratio of 0.32", poisson=0.32),  # with which more than half of the volume is left
         truth=lambda: sum(loads.squeezed_volume(MU, bulk_modulus(POISSON), at) < LOWEST for at in STRETCHES),
         within=0.1,
         because="the value is a number of states, each homogeneous, so that every element represents it exactly",

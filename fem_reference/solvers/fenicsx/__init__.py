@@ -93,7 +93,7 @@ def _solve(problem: AnyMuscle, settings: Settings, sink: Sink, kept: Kept | None
     describe = _describing(problem, settings)
     passed: list[float] = list(kept.frames) if kept else []
 
-    def pass_on(frame: Frame) -> None:  # drops frames of the relaxation before the first requested frame
+    def pass_on(frame: Frame) -> None:  # drops earlier frames, in which overlaps at rest are removed
         if frame.number in problem.frames:
             described = describe(frame, is_first=not passed)
             sink(described if chosen.store_state else replace(described, state=None))
@@ -157,8 +157,8 @@ def _are_known(problem: MuscleProblem, settings: Settings) -> bool:
 
 
 def _loads(problem: MuscleProblem, frame: Frame) -> dict[str, float]:
-    """The components of the external force on the muscle, ``load_force_`` [N], and of its moment about the origin, ``load_moment_``
-    [N mm]. Both are computed from the deformed shape alone, without the solver's forms.
+    """The components of the external force on the muscle, ``load_force_x`` to ``_z`` [N], and of its moment about the origin,
+    ``load_moment_x`` to ``_z`` [N mm]. Both are computed from the deformed shape alone, without the solver's forms.
     """
     state = frame.state
     assert state is not None  # a muscle's frame has a state

@@ -45,7 +45,7 @@ class AssembledBody:
         self.comm, self.reuse, self.effects = MPI.COMM_WORLD, settings.reuse and not body.remembers, body.effects
         changed = (isinstance(one, Energy) and (isinstance(one, Ramped) or not one.stored) for one in self.effects)
         self.conserves = not any(changed)  # True if the energy changes only as the body deforms
-        self.judged = False  # True if the energy gap is judged; if not, a halfway state is not worth its cost
+        self.judged = False  # True if ``path.gap`` is judged; if not, a halfway state is not worth its cost
         self.mesh = meshes.distribute(self.comm, body.mesh)
         count = self.mesh.topology.index_map(3).size_local
         self.cells = np.asarray(self.mesh.topology.original_cell_index, np.int64)[:count]
@@ -134,7 +134,7 @@ class AssembledBody:
 
     def _settle(self, before: Floats, frame: float) -> None:
         """Accept the current state as the state of ``frame``. ``before`` (n,): the unknowns at the start of the load step; if work
-        and energy disagree, a halfway state is solved from them.
+        and energy disagree, a state halfway through the step is computed, starting from them.
         """
         after, contact, middle = np.array(self.unknowns.x.array), self.system.contact, (self.at + frame) / 2
         looked, restoring = list[bool](), [one.restoring() for one in self.contacts]
@@ -174,7 +174,7 @@ class AssembledBody:
 
     def recall(self, frame: float) -> bool:
         """Restore an earlier state with the loads and boundary conditions of ``frame`` and return True, if there is one, its
-        residual confirms equilibrium, and no jump leads to it (after a full turn the loads are those at rest, but not the state).
+        residual confirms equilibrium, and no jump leads to it (after a full turn the loads are as at rest, but the state is not).
         """
         if self.clock.matters or not self.reuse:
             return False
@@ -208,7 +208,7 @@ class AssembledBody:
             self.known.add(KnownState(self._acting(frame), unknowns, modes))
 
     def take_up(self, frame: float, unknowns: Floats, *, recalled: bool) -> None:
-        """Restore the state of ``frame``, with ``unknowns`` (n,), as if it had just been reached. ``recalled``: by ``recall``."""
+        """Restore the state of ``frame``, with ``unknowns`` (n,), as if it had just been reached. ``recalled``: see ``recall``."""
         self.set_frame(frame)
         self.unknowns.x.array[:] = unknowns
         if self.contact:

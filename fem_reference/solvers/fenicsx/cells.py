@@ -26,7 +26,7 @@ class _Element(ctypes.Structure):
 
 
 class Structure(NamedTuple):
-    """The sparsity of a matrix over this rank's unknowns, ghosts included: the ``starts`` of the rows in the sorted ``columns``."""
+    """The sparsity pattern of a matrix over this rank's unknowns with ghosts: ``starts`` of the rows in the sorted ``columns``."""
 
     starts: Places
     columns: Places
@@ -61,7 +61,7 @@ class CellSums:
         self.unknowns: Places = np.concatenate([part.dofmap.list for part in parts], axis=1)[: self.count]
         self.nodes = space.sub(0).sub(0).dofmap.list.shape[1]
         tables = _tables(element, msh, form.rule)
-        self.kept = [np.ascontiguousarray(tables[name]) for name in _FIELDS]  # stays alive, as C only has the addresses
+        self.kept = [np.ascontiguousarray(tables[name]) for name in _FIELDS]  # kept alive, as C has only the addresses
         self.element = _Element(*(table.ctypes.data for table in self.kept))
         self.corners = np.ascontiguousarray(msh.geometry.x[msh.geometry.dofmap[: self.count]])
         sizes = {"POINTS": len(form.rule[1]), "NODES": self.nodes, "PRESSURES": self.unknowns.shape[1] - 3 * self.nodes}
@@ -70,7 +70,7 @@ class CellSums:
         self.projection = self._projection() if is_stabilised(element) else None
 
     def structure(self) -> Structure:
-        """The sparsity of the cells' entries, extended by the full diagonal."""
+        """The sparsity pattern of the cells' entries, extended by the full diagonal."""
         starts = np.arange(0, self.unknowns.size + 1, self.unknowns.shape[1])
         entries = np.ones(self.unknowns.size, bool), self.unknowns.ravel(), starts
         has = csr_array(entries, shape=(self.count, self.size))
@@ -184,8 +184,8 @@ class CellSums:
 
 
 def _without_pressure(values: Floats, others: int) -> Floats:
-    """Eliminate the pressure from the derivatives ``values`` (..., v): the first, then the upper triangle of the second
-    derivatives.
+    """Eliminate the pressure from the derivatives ``values`` (..., v), which are the first derivatives followed by
+    the upper triangle of the second derivatives.
 
     The pressure then follows the volume at each point: the volumetric stiffness K cof F x cof F replaces the coupling terms.
     ``others``: the number of variables other than the pressure.

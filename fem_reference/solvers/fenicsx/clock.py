@@ -78,7 +78,7 @@ class Clock:
             start[:] = values
 
     def arrays(self) -> dict[str, Floats]:
-        """The arrays, apart from the unknowns at its end, from which the last load step can be restored."""
+        """The arrays from which the last load step can be restored, apart from the unknowns at the end of the step."""
         if self.step is None:
             return {}
         found = {"before": np.array(self.step.before.x.array)}

@@ -32,7 +32,7 @@ OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """Let one process at a time run FFCx's compilation. A lock per form would need its signature, which is slow."""
+    """Let one process at a time run FFCx's compilation. A lock per form would need its signature, which is slow to compute."""
 
     @wraps(compiled)
     def waiting(objects: list[Any], *given: Any, **options: Any) -> R:
@@ -70,7 +70,7 @@ def _complete[R](search: Callable[..., R]) -> Callable[..., R]:
 generator.compile_forms = _alone(generator.compile_forms)
 generator.compile_expressions = _alone(generator.compile_expressions)
 generator.get_cached_module = _complete(generator.get_cached_module)
-# UFL creates an element's cell, with all cells of its boundary, at each access: a fifth of the set-up time of a small body.
+# UFL creates an element's cell, with all cells of its boundary, at each access; this is a fifth of the set-up time of a small body.
 ufl.cell.Cell = cache(ufl.cell.Cell)
 
 
@@ -80,7 +80,7 @@ def form(expression: Any) -> Any:
 
 
 class _Code(NamedTuple):
-    """A compiled expression, its ``module``, and the indices of the functions and constants it reads in the formula's lists."""
+    """A compiled expression, its ``module``, and the indices, in the formula's lists, of the functions and constants it reads."""
 
     expression: Any
     module: Any
@@ -108,15 +108,15 @@ def expression(value: Any, points: Any) -> Any:
 
 
 def expressions(values: list[Any], points: Any, first: int) -> tuple[Any, Any]:
-    """Two compiled expressions at reference ``points`` (q, 3): of the ``first`` scalars in ``values``, and of all of them."""
+    """Two compiled expressions at reference ``points`` (q, 3): of the first n = ``first`` of the scalar ``values``, and of all."""
     whole, part = _bound(ufl.as_vector(values), points, (first,))
     return part, whole
 
 
 def _bound(value: Any, points: Any, firsts: tuple[int, ...]) -> list[BoundExpression]:
     """Compiled expressions of a ``value`` at reference ``points`` (q, 3): one of all components, then one of the first n components
-    for each n in ``firsts``. A formula is differentiated and looked up only once: for another body only the functions and constants
-    differ, in the same order.
+    for each n in ``firsts``. A formula is differentiated and looked up only once: another body has other functions and constants,
+    but in the same order.
     """
     functions, constants = extract_coefficients(value), extract_constants(value)
     labels = sorted(extract_type(value, Label), key=Label.count)
@@ -140,7 +140,7 @@ def _code(value: Any, points: Any, functions: list[Any], constants: list[Any]) -
 
 
 class _WithoutVariables(MultiFunction):  # type: ignore[misc]  # UFL has no types
-    """Replaces UFL variables by their values. Their labels, and with them the signatures of forms, differ between processes."""
+    """Replaces UFL variables with their values. Their labels, and with them the signatures of forms, differ between processes."""
 
     expr = MultiFunction.reuse_if_untouched
 

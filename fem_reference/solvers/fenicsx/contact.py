@@ -33,7 +33,7 @@ _RIM = 0.25
 @dataclass(frozen=True, eq=False)
 class Pressed:
     """Contact with one bone. ``near`` (m,): points near the bone, including all within the smoothing; ``gap`` (m,) [mm]: their
-    gaps, negative inside. ``pressed`` (k,): the points under pressure; ``pressure`` (k,) [MPa per unit rest area]; the
+    gaps, negative inside. ``pressed`` (k,): the points under pressure; ``pressure`` (k,) [MPa], per unit rest area; the
     ``traction`` (k, 3) [MPa] and its derivative ``slope`` (k, 3, 3) [MPa/mm], both with friction; ``grip``: the friction.
     """
 
@@ -249,7 +249,7 @@ class ContactForces:
         return Trouble("diverged", why) if why else None
 
     def _yielded(self) -> list[tuple[float, str]]:
-        """The bones with a pressed point so deep that it could leave on any side: its depth over half the thickness, a message."""
+        """Bones with a pressed point so deep that it could leave on any side: depth divided by half the thickness, a message."""
         mine, allowed = list[tuple[float, str]](), self.law.allowance(self.frame)
         for entry, one, before in zip(self.bones, self.now, self.overlaps, strict=True):
             depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))
@@ -259,7 +259,7 @@ class ContactForces:
         return mine
 
     def _from_afar(self) -> list[tuple[float, str]]:
-        """The bones with friction that points met from so far away that their slip is unknown: the number of points, a message."""
+        """The bones with friction that points met from so far away that their slip is unknown: number of points, and a message."""
         mine = list[tuple[float, str]]()
         for i, friction in enumerate(self.friction):
             pressed = self.now[i].pressed

@@ -12,14 +12,14 @@ from fem_reference.problems.body import Cells
 from fem_reference.solvers.fenicsx.meshes import Displacement, lagrange
 
 _NINE = np.asarray(lagrange("quadrilateral", 2).points)  # nine points that determine a function of every element
-_ITERATIONS, _ROUGH = 12, 2  # of Newton's method for the nearest point, and for points far beyond the edges
+_ITERATIONS, _ROUGH = 12, 2  # iterations of Newton's method for the nearest point, and for points far beyond the edges
 _LONGEST, _SMALL = 0.5, 1e-14  # the longest step, and the step at which to stop, in reference coordinates
 # The smallest sine of the angle between a line and a facet in a step, and the distance [mm] within which a line meets a point.
 _FLAT, _OFF = 0.01, 1e-9
 # The largest offset of a point from the normal at its nearest point, as a fraction of the size of the facet; and reference
 # coordinates far beyond the edges.
 _ASIDE, _NOWHERE = 1e-6, 9.0
-_BALL = 1.25  # the radius of a ball around a facet, over the largest distance of a node from the mean of the nodes
+_BALL = 1.25  # the radius of a ball around a facet, as a multiple of the largest distance of a node from their mean
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,8 @@ Before = Callable[[Ints], tuple[Floats, Floats]]
 @dataclass(frozen=True, eq=False)
 class Grip:
     """Friction of n points ``which`` (n,), in the frame of the bone: the ``traction`` (n, 3) [MPa], its derivative ``slope``
-    (n, 3, 3) [MPa/mm] and the anchors ``stuck`` (n, 3) [mm]. ``lost`` (n,) [N/mm]: the work per rest area since the settled state.
+    (n, 3, 3) [MPa/mm] and the anchors ``stuck`` (n, 3) [mm]. ``lost`` (n,) [N/mm]: the work dissipated per
+    rest area since the settled state.
     """
 
     which: Ints
@@ -63,7 +64,7 @@ class Friction:
         return Grip(which, -found.stiffness[:, None] * elastic, slope, here - kept[:, None] * elastic, lost)
 
     def _slip(self, which: Ints, here: Floats, gaps: Sampled, before: Before) -> tuple[Floats, Floats]:
-        """The displacement (n, 3) [mm] of points from their anchors, and its derivative (n, 3, 3) by the points' positions."""
+        """The displacement (n, 3) [mm] of points from their anchors, and its derivative (n, 3, 3) with respect to the positions."""
         slip, change = here - self.stuck[which], np.tile(np.eye(3), (len(which), 1, 1))
         new = np.flatnonzero(np.isnan(slip).any(axis=1))
         if len(new):

@@ -7,8 +7,8 @@ from petsc4py import PETSc
 
 from fem_reference.solvers.fenicsx.spent import Spent
 
-# Indices in MUMPS's INFOG: the error, and the number of negative pivots. Indices in its ICNTL: the last front on one process, as
-# its pivots are otherwise not counted; and the memory beyond the estimate, in per cent.
+# Indices in MUMPS's INFOG: the error, and the number of negative pivots. Indices in its ICNTL: factorising the last front on one
+# process, as its pivots are otherwise not counted; and the memory beyond the estimate, in per cent.
 _ERROR, _NEGATIVE, _ROOT_BY_ONE, _MORE_MEMORY = 1, 12, 13, 14
 _FLOPS, _ENTRIES = 3, 29  # index in RINFOG of the operations of a factorisation, in INFOG of the entries of its factors
 # Above this number of unknowns the factors are compressed by blocks (BLR: ICNTL(35)), up to an error of 1e-5 (CNTL(7)). Compression
@@ -47,8 +47,8 @@ def iterate(krylov: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, mos
 
 class Factorised:
     """Solves with the current ``matrix``. If ``lagged``, FGMRES is preconditioned with an older factorisation, which is replaced
-    once the iterations, for one system or for all systems since, have taken longer than a new factorisation. The factors are LDL^T
-    if the matrix is symmetric, otherwise LU.
+    once the iterations, for one system or for all systems since it was made, have taken longer than a new factorisation. The
+    factors are LDL^T if the matrix is symmetric, otherwise LU.
     """
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, lagged: bool, precision: str, spent: Spent) -> None:
@@ -111,7 +111,7 @@ class Factorised:
         operations = self.factors.getMumpsRinfog(_FLOPS)
         self.spent.counts["factorisation_flops"] += operations
         counted = self.factors.getMumpsInfog(_ENTRIES)
-        entries = counted if counted > 0 else -1e6 * counted  # MUMPS reports a large number as minus its millions
+        entries = counted if counted > 0 else -1e6 * counted  # a negative number counts millions
         self.limit = int(min(max(operations / entries / _OPERATIONS, _LEAST), _MOST))
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:

@@ -40,8 +40,8 @@ def rule(element: str, degree: int | None) -> tuple[Floats, Floats]:
 
 
 def with_vertices() -> tuple[Floats, Floats]:
-    """A rule of 18 points on the unit tetrahedron, exact to degree 5: the vertices, twice 4 points on the medians and 6 on the
-    bimedians.
+    """A rule of 18 points on the unit tetrahedron, exact to degree 5: the 4 vertices, two sets of 4 points on the medians, and
+    6 points on the bimedians.
 
     Weights and coordinates solve the seven moment equations of degrees 0, 2, 3, 4, 4, 5 and 5 for the given weight of a vertex;
     for a weight of 0 they agree with Walkington 2000, Quadrature on simplices of arbitrary dimension.

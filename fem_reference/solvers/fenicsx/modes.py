@@ -15,11 +15,11 @@ from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
 from fem_reference.solvers.fenicsx.multigrid import LinearSolver
 
 _ITERATIONS = 40  # the number of inverse iterations
-_LARGER = (1, 2, 4, 8)  # factors of the perturbation, tried in turn if the state returns or no solution is found
+_LARGER = (1, 2, 4, 8)  # factors of the perturbation, tried in turn, with both signs, until a state is more stable
 _SHIFT, _GROWTH = 1e-6, 4.0
 _DIFFERENCE = 1e-3  # the interval for differences along the path, as a fraction of the smallest load step
 # A limit point is reported if it is at most this many smallest load steps ahead: the step that failed was up to two of them long,
-# and the distance is known only to within a factor.
+# and the distance is known only roughly.
 _NEAR = 4
 _SOFT = 0.3  # Near a limit point, the stiffness of the softest mode is at most this fraction of its value at rest.
 
@@ -27,7 +27,7 @@ _SOFT = 0.3  # Near a limit point, the stiffness of the softest mode is at most 
 def softest(body: AssembledBody, linear: LinearSolver) -> PETSc.Vec:
     """The mode of the matrix of ``linear`` whose eigenvalue has the smallest magnitude; its displacements have norm 1.
 
-    It is found by inverse iteration from a random start, in which only displacements have a mass. Raises ``LinearSolveError`` if no
+    It is found from a random start by inverse iteration, in which only displacements have a mass. Raises ``LinearSolveError`` if no
     displacement is free.
     """
     moves = _free(body)

@@ -19,14 +19,14 @@ _KEPT, _SHORTEST = 0.1, 1e-2
 _FIRST, _FACTOR, _LOOSEST, _TIGHTEST = 1e-3, 0.5, 1e-3, 1e-9
 # Newton's method gives up if the residual has not fallen to ``_PROGRESS`` times its earlier best within ``_PATIENCE`` iterations.
 _PATIENCE, _PROGRESS = 6, 0.5
-# A linear solution that would end below the target of Newton's method continues to this fraction of the target, as the residual of
-# the last linear system is the residual of the entire iteration.
+# A tolerance of a linear system that is below the target of Newton's method is lowered to this fraction of the target, as the
+# residual that the last linear system leaves remains at the end of the iteration.
 _PAST = 1e-2
 
 
 class Newton:
-    """Newton's method on a ``system``, with full steps from ``linear``. There is no line search: it would weigh forces [N] against
-    volumes [mm3], and would stall for bodies that bend or are soft.
+    """Newton's method on a ``system``; ``linear`` solves for the full steps. There is no line search: it would weigh forces [N]
+    against volumes [mm3], and would stall for bodies that bend or are soft.
     """
 
     def __init__(

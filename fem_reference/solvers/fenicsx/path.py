@@ -61,7 +61,7 @@ class Path:
         state, compare the growth of the energy with the work of the internal forces, by the trapezoidal rule.
 
         The rule is exact if forces are linear in the displacement. Its error is of second order in the step; for a law that
-        stiffens, or a rotation, it is tenths of the energy in the first step from rest. So if the difference exceeds
+        stiffens, or a rotation, it is some tenths of the energy in the first step from rest. So if the difference exceeds
         ``ENERGY_GAP``, the function ``halfway`` is called: it solves for a state halfway, leaves it in the unknowns, which are
         restored afterwards, and returns True if it succeeds. Simpson's rule is then used, whose error is of fourth order. In a
         jump, either rule shows a decrease of the energy without work. ``gap``: the largest difference since it was last read,

@@ -24,7 +24,7 @@ _SHALLOW, _NEAR = 0.25, 0.4
 _STAYS = 4.0  # beyond edges, a point stays on its last facet unless another has this many times the pressure
 _ON = 1e-7  # a line meets a facet up to this distance beyond the facet's edges, in reference coordinates
 _AT = 0.02  # the same for the point of a facet that is nearest to a point
-_BENT = 3.0  # the height, in bulges of a facet, up to which it can face a point inside; 2.1 for a bend of 45 degrees
+_BENT = 3.0  # largest height, in bulges of a facet, of a point inside that it may face; 2.1 for a bend of 45 degrees
 _SAME = 1e-6  # two crossings of a line are the same up to this distance [mm]
 # A point is in contact if it has at least this fraction of its pressure, or if its depth beyond the smoothing is at most this many
 # times the depth that belongs to its pressure.
@@ -38,7 +38,7 @@ def _step(x: Floats) -> tuple[Floats, Floats]:
 
 
 def facing(here: FacetPlaces, there: FacetPlaces) -> tuple[Floats, Floats]:
-    """The fraction (n,) of the pressure that acts at this cosine between the normals of facing points, and its derivative."""
+    """The fraction (n,) of the pressure that acts, and its derivative with respect to the cosine between the points' normals."""
     share, slope = _step((-np.vecdot(here.normal, there.normal) - GRAZING) / (_FRONTAL - GRAZING))
     return share, slope / (_FRONTAL - GRAZING)
 
@@ -155,7 +155,7 @@ class RayPass(Pass):
         return Hits(points, own, here[found], facets[found], there[found], gap[found], left[found], shades)
 
     def _hidden(self, nodes: Floats, here: FacetPlaces, gap: Floats) -> Ints:
-        """The hits (k,) that lie behind a nearer crossing of a facet out of reach; ``_lines`` leaves such crossings out."""
+        """The hits (k,) that lie behind a nearer crossing with a facet out of reach; ``_lines`` leaves such crossings out."""
         reach = self._reach(nodes)
         deep = np.flatnonzero(-gap > reach.min())
         if not len(deep):
@@ -183,7 +183,7 @@ class RayPass(Pass):
         return some[kept], facets[kept], here[np.flatnonzero(kept)]
 
     def _ends(self, at: Floats, gap: Floats, facets: Ints) -> tuple[Floats, Floats, Floats]:
-        """The fraction (n,) of the pressure that acts beyond edges, its derivatives by coordinates (n, 2) and by the gap (n,)."""
+        """The fraction (n,) of the pressure that acts beyond edges; its derivatives with respect to place (n, 2) and gap (n,)."""
         size, (beyond, leaving) = _SHALLOW * self.other.balls(self.other.rest)[1][facets], self.other.leaving(at)
         (wide, by_place), (shallow, by_gap) = _step(1 - beyond / _WIDE), _step(2 + 2 * gap / size)
         out = beyond > _ON

@@ -16,9 +16,9 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 SMALL = 4000
 # From this number of unknowns on, multigrid is faster than one factorisation per frame.
 LARGE = 350_000
-# Memory [MB] of a process without a body, for each unknown in addition to the factors, for each unknown in total with multigrid,
-# and of the factors for 16 000 unknowns in double precision; and the exponent with which the factors grow. Measured on
-# gluteus_maximus from 16 000 to 560 000 unknowns. MUMPS allocates more than it uses.
+# Memory [MB]: of a process without a body; for each unknown, in addition to the factors; for each unknown with multigrid, in total;
+# of the factors for 16 000 unknowns in double precision. Then the exponent with which the memory of the factors grows. Measured on
+# gluteus_maximus with 16 000 to 560 000 unknowns. MUMPS allocates more than it uses.
 _EMPTY, _EACH, _EACH_MULTIGRID, _FACTORS, _POWER = 250.0, 6.5e-3, 1e-2, 60.0, 1.38
 # The maximum size [bytes] of the states of all frames that a run stores by default.
 MOST_STATES = 2**26

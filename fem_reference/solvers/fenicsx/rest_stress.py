@@ -1,4 +1,4 @@
-"""The stress at rest of a body in situ, in its weak form; ``in_situ`` finds it."""
+"""The stress at rest of a body in situ, as a term of its weak form; ``in_situ`` finds it."""
 
 from typing import Any
 

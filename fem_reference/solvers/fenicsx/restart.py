@@ -62,8 +62,8 @@ class Restart:
 
     def good(self) -> tuple[int, ...]:
         """The frames from whose states the run can continue. These are all frames, unless other effects acted when they were
-        stored: then they are the frames before the first that is no longer in equilibrium, or none if rates matter. The body is
-        restored afterwards.
+        stored: then they are the frames before the first that is no longer in equilibrium, or none if an effect depends on
+        the rate of motion. The body is restored afterwards.
         """
         body, found = self.body, list[int]()
         rest, at = np.array(body.unknowns.x.array), body.at

@@ -153,7 +153,8 @@ class Rubbing:
 
     def _starts(self, met: Met) -> tuple[Floats, Floats, Floats]:
         """The facet coordinates (n, 2) from which the points slip, the fraction (n,) of the path from there that counts as slip,
-        and the derivative (n,) of the fraction by the gap. A point new in contact slips from where its path enters the smoothing.
+        and the derivative (n,) of the fraction with respect to the gap. A point new in contact slips from the position at which its
+        path comes within the smoothing.
         """
         at, share, by_gap = self.at[met.points], np.ones(len(met.gap)), np.zeros(len(met.gap))
         moved = np.flatnonzero(self.facets[met.points] != met.facets)

@@ -16,21 +16,21 @@ class BodySettings(Record):
     ``element``: one of ``body.ELEMENTS``. ``first_step``: the first load step. The step grows by half after an easy step (at most 5
     Newton iterations), up to ``largest_step`` if given, and is halved, down to ``smallest_step``, if Newton's method needs more
     than ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal forces and
-    of the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are integrated exactly
-    on a straight cell; the default depends on the element.
+    of the residual of the volume equation is at most this value. ``quadrature_degree``: the degree of the polynomials that are
+    integrated exactly on a straight cell; the default depends on the element.
 
     ``linear_solver``: ``"direct"`` factorises each system. ``"lagged"`` uses inexact FGMRES, preconditioned with a factorisation
-    that is reused until a new one is cheaper; before a run ends ``out of steps``, it is continued with exact solutions.
+    that is reused until a new one is cheaper; if even the smallest load step fails, systems are solved exactly from then on.
     ``"multigrid"`` uses FGMRES with two levels of elements. The default depends on the size. ``precision``: the precision of
     factorisations, by default double for ``"direct"`` and single for ``"lagged"``. Both settings change the time, not the result.
 
     ``follow``: ``"equilibrium"`` accepts any equilibrium that Newton's method finds. With ``"stable"``, if the equilibrium of a
     frame is unstable (and negative modes are counted), the body is moved along its lowest mode by a ``perturbation``, a fraction of
-    its size, and the frame is solved again; the move is reversed and enlarged, up to eight times, until fewer modes are negative.
-    ``reuse``: reuse the state of an earlier frame with the same load. ``time_limit``: the limit on processor time for each rank, by
-    default none; if the wall-clock time exceeds twenty times this limit, the status is *stalled*, which allows no conclusion.
-    ``store_state``: each frame also stores the unknowns of every cell, from which ``results`` evaluates stress, pressure, det F and
-    fibre stretch; by default only for a muscle whose frames together take at most 64 MB.
+    its size, and the frame is solved again. Moves of 1, 2, 4 and 8 times this length, in both directions, are tried until there are
+    fewer negative modes. ``reuse``: reuse the state of an earlier frame with the same load. ``time_limit``: the limit on processor
+    time for each rank, by default none; if the wall-clock time exceeds about twenty times this limit, the status is *stalled*,
+    which allows no conclusion. ``store_state``: each frame also stores the unknowns of every cell, from which ``results`` evaluates
+    stress, pressure, det F and fibre stretch; by default only for a muscle whose frames together take at most 64 MB.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
@@ -50,7 +50,9 @@ class BodySettings(Record):
 
 
 class Settings(BodySettings):
-    """Numerical settings for a muscle. ``ranks``: the number of MPI processes, by default 1, or 2 if faster and cores are free."""
+    """Numerical settings for a muscle. ``ranks``: the number of MPI processes, by default 2 if that is faster and two cores are
+    idle, otherwise 1.
+    """
 
     ranks: int | None = Field(default=None, gt=0, le=1024)
 

@@ -24,9 +24,9 @@ class Stability:
         pressure follows the volume at every point.
 
         An element with a pressure controls the volume on average only. Shrinking at one point and swelling at another costs no
-        energy, so under a stress of several shear moduli the energy of the element may decrease in such modes although the energy
-        of the material does not. The displacements of the elements are a subset of those of the body, so the body has at least this
-        many negative modes.
+        energy, so under a stress of several times the shear modulus the energy of the element may decrease in such modes although
+        the energy of the material does not. The displacements of the elements are a subset of those of the body, so the body has at
+        least this many negative modes.
         """
         found = self.negative_modes(pointwise=self.pressures > 0)
         self.negative_modes()  # restores the tangent and its factors for the next solve

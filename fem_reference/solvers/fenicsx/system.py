@@ -120,7 +120,7 @@ class System:
             return self._finish(tractions, moves)
 
     def _finish(self, tractions: Tractions | None, moves: Floats | None) -> float:
-        """Complete the residual with all terms except those of cells and with the parts of other ranks; return its norm."""
+        """Complete the residual of the cells with all other terms and with the contributions of other ranks; return its norm."""
         for terms in self.surface:
             terms.add_residual(self.work.array, moves)
         for tie in self.ties:
@@ -167,7 +167,7 @@ class System:
         return bool(self.unknowns.function_space.mesh.comm.allreduce(most, MPI.MAX) > _ROUNDING)
 
     def reactions(self, *, inside: bool = False) -> Floats:
-        """The residual (n,) on the ranks that own the unknowns, without springs over facets but also at prescribed unknowns. With
+        """The residual (n,) on the ranks that own the unknowns, including prescribed unknowns, but without springs on facets. With
         ``inside``, it is the residual of the effects inside the body alone.
         """
         self.work.array[:] = 0

@@ -48,7 +48,7 @@ class TouchingForces:
             seen = max(depth for one, depth in depths if one is law)
             left = max(seen, 0.0) + unseen(body.mesh, law) if law.relaxed else 0.0
             deep, most = max(seen, overlap(body, law)), law.smoothing + left
-            if deep > most:  # deeper than the smoothing, the removed overlap, and what points may fail to detect
+            if deep > most:  # deeper than the sum of the smoothing, the removed overlap and what points may miss
                 raise ArithmeticError(
                     f'"{law.one}" and "{law.other}" overlap by {deep:.3g} mm; at most {most:.3g} mm is allowed'
                 )
@@ -73,7 +73,7 @@ class TouchingForces:
     @staticmethod
     def _passes(body: Body, form: Form, displacement: Displacement) -> tuple[list[Pass], list[Pass | None]]:
         """Two passes for each law, one from each side (a single one if a part touches itself); and for each pass the skin around
-        the other part, which the points of the pass must not touch. It is None if there is none or it takes part in contact.
+        the other part, which the points of the pass must not touch. It is None without such a skin, or if it takes part in contact.
         """
         both = ((law, dict.fromkeys(((law.one, law.other), (law.other, law.one)))) for law in body.touching)
         sides = [(law, *pair) for law, pairs in both for pair in pairs]
@@ -203,7 +203,7 @@ class TouchingForces:
             self.seen = np.full_like(self.seen, np.nan)
 
     def trouble(self, before: Floats, /) -> Trouble | None:
-        """The trouble *diverged* if a point has gone through the other part, past its rim, or too far since ``before`` (n,)."""
+        """The trouble *diverged* if, since ``before`` (n,), a point went through the other part or slid past its rim or too far."""
         self.look()
         columns = self.passes, self.rims, self.settled[1], self.now, self.rubbed
         for one, rim, (last, _), (met, _), rubbed in zip(*columns, strict=True):

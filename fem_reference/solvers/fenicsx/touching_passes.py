@@ -16,11 +16,11 @@ from fem_reference.solvers.fenicsx.own_pairs import OwnPairs, pairs
 # the normals of two facets at their common edge are nearest to neither facet.
 _BEYOND = 0.02
 # A point stays on its facet up to this distance beyond the edges, unless another facet is nearer by more than the smoothing: where
-# two facets meet at an angle, Newton's method would go back and forth between them.
+# two facets meet at an angle, Newton's method would otherwise go back and forth between them.
 _STAYS = 0.05
 # The cosine between normals above which a point that slides off a sharp edge is free, as the part faces another way there.
 _FACING = -0.5
-# In self-contact, a point behind a facet by less than this fraction of their radii and half thicknesses counts as in front.
+# In self-contact, a point counts as in front of a facet up to this fraction of the radii and half thicknesses of both facets.
 _DEEP = 0.125
 # There is no contact pressure up to this cosine between a point's normal and minus the facet's: the point does not face the facet.
 GRAZING = 0.3
@@ -51,9 +51,9 @@ class Met:
 @dataclass(frozen=True, eq=False)
 class PressedPoints:
     """Contact of n points. ``dofs`` (n, a): the unknowns of the nodes that carry the points and the places they meet; ``rows``
-    (n, r, a): the derivatives of r quantities by these unknowns, such as the gap, the position along two tangents and the tangents
-    along the normal; ``pull`` (n, r) [N]: the forces that belong to the quantities; ``second`` (n, r, r): their derivatives, with
-    the sign of an energy's Hessian; ``force`` (n, 3) [N]: the forces on the points.
+    (n, r, a): the derivatives with respect to these unknowns of r quantities, such as the gap, the position along two tangents and
+    the tangents along the normal; ``pull`` (n, r) [N]: the forces that belong to the quantities; ``second`` (n, r, r): their
+    derivatives, with the sign of an energy's Hessian; ``force`` (n, 3) [N]: the forces on the points.
     """
 
     dofs: Ints
@@ -179,12 +179,12 @@ class Pass:
         return np.vecdot(points[some] - middle.point[facets], middle.normal[facets]), bulge
 
     def pressure(self, met: Met) -> tuple[Floats, Floats]:
-        """The pressure (n,) [MPa] on points that ``met`` the other side, without overlaps at rest, and its slope in the gap."""
+        """The pressure (n,) [MPa] on ``met`` points, with overlaps at rest subtracted, and its slope with respect to the gap."""
         (whole, slope), shares = self.whole(met), self.shares(met)
         return shares * whole, shares * slope
 
     def whole(self, met: Met) -> tuple[Floats, Floats]:
-        """The ``pressure`` before multiplication by ``shares``, and its slope in the gap."""
+        """The ``pressure`` before multiplication by ``shares``, and its slope with respect to the gap."""
         return self.law.pressure(met.gap + self.share * self.overlaps[met.points])
 
     def shares(self, met: Met) -> Floats:
@@ -236,10 +236,10 @@ class Pass:
         return float((-met.gap).max(initial=0.0))
 
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
-        """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), without points that
-        ``met`` it: they are behind the facet that they were near, or passed a facet on their path. Paths that begin inside, or so
-        near that flat pieces of a facet may be in front, are also followed from in front, raised by at most the facet's reach,
-        within which points are met. Points that end in front of a facet have passed only flat pieces of it.
+        """The points (k,) that went through the other side from the unknowns ``before`` to ``now`` (n,), except points that
+        ``met`` it: points that are behind the facet that they were near, and points that passed a facet on their path. Paths that
+        begin inside, or so near that flat pieces of a facet may be in front of them, are also followed from in front: raised by at
+        most the depth to which points are met. Points that end in front of a facet have passed only flat pieces of it.
         """
         return self._passed_by(before, last, now, met.points, np.zeros(len(self.areas)))
 
@@ -273,9 +273,9 @@ class Pass:
         return np.minimum(self.other.balls(nodes)[1], self.deepest)
 
     def slid(self, now: Floats, pressed: Ints, met: Ints) -> Ints:
-        """The points (k,) that reach the other side, a skin that may not be touched, at the unknowns ``now`` (n,) without contact:
-        points that were ``pressed`` before by the part next to the skin, and all deep points. Points that ``met`` a part are in
-        contact. A point above the part may be behind a wall of the skin, but is then beyond the wall's edge.
+        """The points (k,) that reach the other side, here a skin that may not be touched, at the unknowns ``now`` (n,): points that
+        were ``pressed`` before by the part next to the skin, and all deep points, except points that ``met`` the part, as they are
+        in contact. A point above the part may be behind a wall of the skin, but is then beyond the wall's edge and not counted.
         """
         near = self.met(now, self.law.smoothing)
         facing = np.einsum("ni,ni->n", near.here.normal, near.there.normal) < _FACING
