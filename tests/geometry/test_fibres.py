@@ -106,6 +106,13 @@ def test_lines_stay_in_the_mesh() -> None:
     assert found.outside.max() < 0.05  # the sagitta of a chord of a 4 degree facet is 0.02 mm
 
 
+def test_a_line_does_not_depend_on_the_lines_traced_with_it() -> None:
+    """Seeds are chosen one after another, so fewer lines are the first of more. The outer lines of the ring end later."""
+    few, more = (trace(_ring(1), "bottom", "top", count) for count in (3, 12))
+    assert np.ptp(more.lengths()) > 5
+    assert_allclose(few.points, more.points[: len(few.points)], rtol=0, atol=1e-9)  # round-off of sums in another order
+
+
 def test_the_same_mesh_gives_the_same_lines() -> None:
     assert_array_equal(trace(_ring(1), "bottom", "top", 8).points, trace(_ring(1), "bottom", "top", 8).points)
 
