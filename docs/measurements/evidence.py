@@ -105,7 +105,7 @@ def _credibility_grades() -> str:
         rows.append((one["quantity"], f"**{one['grade']}**", *said, " to ".join(one["band"]) or "not known"))
     experiment = (
         "measurements reproduced",
-        "deviation of measurements not reproduced",
+        "deviation from measurements not reproduced",
         "number of specimens, by source",
     )
     head = (
