@@ -35,7 +35,7 @@ _SIDE = 2.0
 def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
     """The sorted vertices (k,) of the muscle's ``surface`` that ``case.attachment[i]`` attaches to a bone with ``bone_surface``.
 
-    Raises InputError that names the invalid key of the case, or the file and its row (comment lines do not count).
+    Raises an InputError that names the invalid key of the case, or the file and its row (comment lines do not count).
     """
     attachment = case.attachment[i]
     key = f"attachment[{i}]"
@@ -153,8 +153,8 @@ def _longest_side(surface: Surface) -> float:
 
 
 def fan(points: Floats) -> Surface:
-    """A fan of triangles between the centroid of ``points`` (n, 3) and each two neighbouring points. Neighbours follow each other
-    in the order of their angles in the best-fit plane.
+    """A fan of triangles between the centroid of ``points`` (n, 3) and each pair of neighbouring points. Neighbours are consecutive
+    in the order of the angles in the best-fit plane.
     """
     centre = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - centre)

@@ -114,7 +114,7 @@ def _added(acting: Acting, one: tuple[Effect, float], now: Floats, stress: Calla
 
 
 def _stretches(acting: Acting, F: Floats, fibre: Floats | None, volumes: Floats) -> tuple[float, float]:
-    """The smallest and the greatest fibre stretch in the energies; a hundredth of the volume at each extreme is left out."""
+    """The smallest and the greatest elastic stretch of fibres; a hundredth of the volume at each extreme is left out."""
     if fibre is None:
         return 1.0, 1.0
     state = elastic_state(acting, State([list(row) for row in np.moveaxis(F, 0, -1)], fibre=list(fibre.T)))
@@ -196,7 +196,7 @@ class Watch:
         return decision(effect, found, now)
 
     def _moving(self, now: Estimates, number: float) -> Estimates:
-        """The estimates ``now``, updated with the motion of the solved surface up to frame ``number``, which loads cause too."""
+        """The estimates ``now``, updated with the motion of the solved surface up to frame ``number``, as loads move it too."""
         before = [earlier for earlier in sorted(self.frames) if earlier < number][-2:]
         if not before:
             return now
