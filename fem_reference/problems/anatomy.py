@@ -76,7 +76,7 @@ def tendon_of(case: MuscleCase, i: int) -> Floats | None:
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
-    """The outward boundary triangles (m, 3) of a ``mesh`` that count as attached, if the mesh does not follow the rim of the
+    """The boundary triangles (m, 3), oriented outwards, that count as attached in a ``mesh`` that does not follow the rim of the
     attachment.
 
     A triangle is attached if its attached share, averaged over seven sample points, is above 1/2. ``surface``: the surface that the
@@ -186,7 +186,7 @@ log = logging.getLogger(__name__)
 
 # Fibres are traced in a separate mesh of about this number of tetrahedra.
 TETS = 8000
-# Lines traced for each required surface fibre; the outermost lines, just below the surface, become the surface fibres.
+# The number of lines traced for each required surface fibre; the outermost, just below the surface, become the surface fibres.
 _OUTER = 5
 
 

@@ -104,7 +104,7 @@ def decision(effect: Effect, found: Indicator | None, known: Estimates) -> Decis
 
 def solved(known: Estimates, rest: Setup, bones: tuple[Bone, ...], number: float, at: Floats) -> Estimates:
     """The ``known`` estimates, updated from a solved frame. ``number``: the frame number; ``at`` (n, 3): the positions of the
-    surface, whose nearness to ``bones`` is measured.
+    surface, whose nearness to ``bones`` is computed.
     """
     chosen, felt = _chosen(rest), rest.exempt.places(_PLACES)
     points, moved = rest.surface.points[chosen], at[chosen]

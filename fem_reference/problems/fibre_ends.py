@@ -162,8 +162,8 @@ def _steps(start: Floats, end: Floats) -> Floats:
 
 
 def _covered(part: Floats, ends: Floats, fibres: int) -> float:
-    """The fraction of the area of the triangles ``part`` (r, 3, 3) that is covered by ``ends`` (m, 3): their centroids are within
-    the mean spacing of the fibres from an end. ``fibres``: the number of fibres.
+    """The fraction of the area of the triangles ``part`` (r, 3, 3) that is covered by ``ends`` (m, 3). A triangle is covered if
+    its centroid is within the mean spacing of the fibres from an end. ``fibres``: the number of fibres.
     """
     areas = corner_areas(part)
     if len(ends) == 0 or not areas.sum():

@@ -130,7 +130,7 @@ def sag(rest: Setup, frames: list[int], travel: float) -> float:
 
 
 def turn(rest: Setup, frame: float) -> float:
-    """The rotation [rad] of the last attached bone relative to the first attached bone at a ``frame``, since rest."""
+    """The rotation [rad] of the last attached bone relative to the first attached bone, from rest to a ``frame``."""
     first, last = (rest.attached[i].bone.pose(frame)[:3, :3] for i in (0, -1))
     return float(Rotation.from_matrix(first.T @ last).magnitude())
 

@@ -130,9 +130,9 @@ def _mean(stress: Floats, volumes: Floats) -> float:
 class Watch:
     """A watch on the influence that the omitted effects of a ``case`` would have on the frames of a run, as these are solved.
 
-    The stresses of omitted and of acting effects follow from a solved state without another solution. They are compared with the
-    stress of the acting effects: during a run, with the maximum of the ``known`` estimate and the stresses so far; at the end, with
-    the maximum of all stresses. ``frames``: the surface (n, 3) of each frame, and the stresses in its tetrahedra, None without any.
+    The stresses of omitted and of acting effects follow from a solved state without another solution. The former are compared with
+    the latter: during a run, with the maximum of the ``known`` estimate and the stresses so far; at the end, with the maximum of
+    all stresses. ``frames``: the surface (n, 3) of each frame, and the stresses in its tetrahedra, None without any.
     """
 
     def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:

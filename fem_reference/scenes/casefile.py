@@ -116,7 +116,7 @@ def read_muscle(case: str | Path, changes: dict[str, Any] | None = None) -> Musc
 
 
 def muscle(case: Case, place: str | None = None) -> MuscleCase:
-    """The ``case`` itself, if it has a single muscle. Otherwise raises InputError at ``place``, by default the file of the case."""
+    """The ``case`` itself if it has one muscle. Otherwise an InputError names ``place``, by default the file of the case."""
     if not isinstance(case, MuscleCase):
         kind = "a case of several muscles" if isinstance(case, MusclesCase) else "a scalar case"
         raise InputError(place or case.place, f'"{case.name}", {kind}', "the case of a muscle")

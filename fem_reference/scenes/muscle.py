@@ -251,7 +251,7 @@ class Uncertain(Range):
 
 class DrivenCase(Case):
     """The case of one or several muscles driven by bones. ``choice`` (the key ``effects``): ``"listed"`` if all listed effects act,
-    ``"auto"`` if only those that the case needs act.
+    ``"auto"`` if only the effects that are needed act.
     """
 
     choice: Literal["listed", "auto"] = Field(default="listed", alias="effects")
