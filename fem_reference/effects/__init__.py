@@ -210,7 +210,7 @@ class Prestrain(Effect):
 
 
 def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
-    """The ``state`` with the F on which energies depend: its elastic part if ``acting``, pairs (effect, amount), prestrain it."""
+    """The ``state`` with the F that energies depend on: its elastic part if ``acting``, pairs (effect, amount), has a prestrain."""
     for effect, amount in acting:
         if isinstance(effect, Prestrain):
             now, before = (effect.elastic(replace(state, F=F, amount=amount)) for F in (state.F, state.F_before))
@@ -232,8 +232,8 @@ def fibre_indicator(scene: Estimates, pull: float, distance: float) -> Indicator
 
 
 class FieldEffect(Record):
-    """A frozen record of the parameters of a term in ``-div(k grad psi) + v . grad psi + c psi - f = 0`` (report eq. 4.4, whose A,
-    B, C and D f are -k, v, c and f). ``example``: example values of its parameters, as in scene files.
+    """A frozen record of the parameters of a term in ``-div(k grad psi) + v . grad psi + c psi - f = 0``: eq. 4.4 of the report
+    DCSE/TR-2022-03, whose A, B, C and D f are -k, v, c and f. ``example``: example values of its parameters, as in scene files.
     """
 
     example: ClassVar[dict[str, Any]] = {}

@@ -6,7 +6,7 @@ from fem_reference.effects import FieldEffect, FieldState, Place
 
 
 class Advection(FieldEffect):
-    """``v . grad psi``; on a surface, only the tangential part of v acts. Report eq. 4.4: ``B = v``.
+    """``v . grad psi``; on a surface, only the tangential part of v acts. Eq. 4.4 of the report DCSE/TR-2022-03: ``B = v``.
 
     ``velocity``: v [length / time], with one component for each coordinate of the domain.
     """

@@ -8,7 +8,7 @@ from fem_reference.effects import FieldEffect, FieldState, Place
 
 
 class Diffusion(FieldEffect):
-    """``-div(k grad psi)``; on a surface, the Laplace-Beltrami operator. Report eq. 4.4: ``A = -k``.
+    """``-div(k grad psi)``; on a surface, the Laplace-Beltrami operator. Eq. 4.4 of the report DCSE/TR-2022-03: ``A = -k``.
 
     ``coefficient``: k, greater than 0 [length^2 / time, in the units of the scene].
     """

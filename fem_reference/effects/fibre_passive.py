@@ -18,12 +18,12 @@ _SOURCE = (
 
 
 class FibrePassive(PassiveFibres):
-    """``dW/dl = stress f(l)``, where ``l`` is the isochoric fibre stretch divided by the optimal stretch, and f is 0 up to 1,
-    ``p1 (exp(p2 (l - 1)) - 1)`` from 1 to ``linear_from``, and the tangent line beyond.
+    """``dW/dl = stress f(l)``, where ``l`` is the isochoric fibre stretch divided by the optimal stretch, and f is 0 for
+    ``l`` up to 1, ``p1 (exp(p2 (l - 1)) - 1)`` from 1 to ``linear_from``, and the tangent line beyond.
 
-    ``stress`` [MPa]: the peak active stress, by which the source scales the law; ``p1``, ``p2``: without unit; ``optimal_stretch``:
-    the fibre stretch at optimal length; ``linear_from``: the value of ``l`` at which the tangent line begins. Source: Blemker,
-    Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
+    ``stress`` [MPa]: the peak active stress, by which the source scales the law; ``p1``, ``p2``: dimensionless;
+    ``optimal_stretch``: the fibre stretch at optimal length; ``linear_from``: the value of ``l`` at which the tangent line begins.
+    Source: Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 
     Valid for ``l`` up to 1.6, or up to ``linear_from`` if this is greater. At 1.6 the active tension of the same source ends, and
     no data on longer fibres support this law. There is no lower limit, because shorter fibres are slack.

@@ -14,10 +14,10 @@ RULE = tuple(zip(((_POINTS + 1) / 2).tolist(), (_WEIGHTS / 2).tolist(), strict=T
 
 
 class FibrePassiveFebio(PassiveFibres):
-    """``l dW/dl``, where ``l`` is the isochoric fibre stretch, is 0 up to 1, ``c3 (exp(c4 (l - 1)) - 1)`` from 1 to
-    ``linear_from``, and ``c5 l + c6`` beyond, where c6 makes the function continuous.
+    """``l dW/dl``, where ``l`` is the isochoric fibre stretch, is 0 for ``l`` up to 1, ``c3 (exp(c4 (l - 1)) - 1)`` from
+    1 to ``linear_from``, and ``c5 l + c6`` beyond, where c6 makes the function continuous.
 
-    ``c3``, ``c5`` [MPa]; ``c4`` without unit; ``linear_from``: a value of ``l``. Source: FEBio Theory Manual, "Transversely
+    ``c3``, ``c5`` [MPa]; ``c4`` dimensionless; ``linear_from``: a value of ``l``. Source: FEBio Theory Manual, "Transversely
     Isotropic Hyperelastic"; Weiss, Maker and Govindjee 1996, doi 10.1016/0045-7825(96)01035-3. The energy of the toe is an
     exponential integral, which is computed by a Gauss-Legendre rule. The error of this rule is below 1e-12 c3 if
     ``c4 (linear_from - 1)`` is at most 6 and ``linear_from`` is at most 2.

@@ -9,13 +9,13 @@ from fem_reference.foundations.units import PositivePressure
 
 
 class Guccione(Energy):
-    """``c/2 (exp(Q) - 1)`` with ``Q = bf Eff^2 + bt (Ess^2 + Enn^2 + 2 Esn^2) + 2 bfs (Efs^2 + Efn^2)``, where
-    ``E = (J^(-2/3) C - 1) / 2`` has components along the fibre (f) and two directions perpendicular to it and each other (s, n).
+    """``c/2 (exp(Q) - 1)`` with ``Q = bf Eff^2 + bt (Ess^2 + Enn^2 + 2 Esn^2) + 2 bfs (Efs^2 + Efn^2)``. The indices of
+    ``E = (J^(-2/3) C - 1) / 2`` stand for the fibre (f) and for two directions perpendicular to it and to each other (s, n).
 
-    ``c`` [MPa]; ``bf``, ``bt``, ``bfs`` without unit. Source: Guccione, McCulloch and Waldman 1991, doi 10.1115/1.2894084, as in
+    ``c`` [MPa]; ``bf``, ``bt``, ``bfs`` dimensionless. Source: Guccione, McCulloch and Waldman 1991, doi 10.1115/1.2894084, as in
     Land et al. 2015, doi 10.1098/rspa.2015.0641, both for incompressible material. Without the factor ``J^(-2/3)`` the pressure
-    unknown would have to balance all of a large tension, and the ventricle of Land et al. with two layers of mixed elements would
-    lose equilibrium.
+    unknown would have to balance the whole of a large tension, and the ventricle of Land et al., meshed with two layers of mixed
+    elements, would lose equilibrium.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)

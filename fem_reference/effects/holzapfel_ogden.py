@@ -13,7 +13,7 @@ from fem_reference.foundations.units import Angle, PositivePressure
 class HolzapfelOgden(Energy):
     """``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` for each family that is stretched, with ``I = J^(-2/3) a . C a`` above 1.
 
-    ``k1`` [MPa]; ``k2`` without unit; ``angle`` [rad]: the unit vectors ``a`` of the two families are the fibre direction rotated
+    ``k1`` [MPa]; ``k2`` dimensionless; ``angle`` [rad]: the unit vectors ``a`` of the two families are the fibre direction rotated
     by plus and by minus this angle; ``normal``: the axis of this rotation, of any length and not along a fibre. Only the component
     of ``normal`` perpendicular to the fibre matters. Source: Holzapfel, Gasser and Ogden 2000, doi 10.1023/A:1010835316564.
     """

@@ -19,7 +19,7 @@ class InSitu(Prestrain):
     attachments, which are extended at rest, and by the bones. A bone presses where the muscle touches it, or where the muscle is
     within the distance ``support`` of the bone (see ``contact``), through the tissue in between.
 
-    ``stretch``: without unit; above 1 if fibres are taut at rest, 1 if only an activation acts at rest. Source: Maas, Erdemir,
+    ``stretch``: dimensionless; above 1 if fibres are taut at rest, 1 if only an activation acts at rest. Source: Maas, Erdemir,
     Halloran and Weiss 2016, doi 10.1016/j.jmbbm.2016.04.012, who iterate to a prestrain that is in equilibrium with this stretch.
     Here the incompatible part of the prestrain is replaced by a constant stress, which is the solution of one linear problem.
     """

@@ -10,10 +10,10 @@ class Incompressible(VolumeLaw):
 
     ``bulk``: the bulk modulus K [MPa]. Source: Sussman and Bathe 1987, doi 10.1016/0045-7949(87)90265-3, with U = K/2 (J - 1)^2.
 
-    Valid for J near 1, here from 1/2 to 2. The slope ``dU / d(log J) = K J (J - 1)`` is steepest at 1/2. Below 1/2 the resistance
-    to further shrinking decreases, and U remains below K/2 down to J = 0. Isochoric laws can therefore make a body shrink to almost
-    nothing (``verification/squeeze.py`` has an example). Above 1 the law has no such limit. The value 2 is as far from 1 as 1/2 on
-    a logarithmic scale, and far above any volume ratio of water-filled tissue.
+    Valid for J near 1, here from 1/2 to 2. The slope ``dU / d(log J) = K J (J - 1)`` has its minimum at 1/2. Below 1/2 the
+    resistance to further shrinking decreases, and U remains below K/2 down to J = 0. Isochoric laws can therefore make a body
+    shrink to almost nothing (``verification/squeeze.py`` has an example). Above 1 the law has no such limit. The value 2 is as far
+    from 1 as 1/2 on a logarithmic scale, and far above any volume ratio of water-filled tissue.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ("pressure",)

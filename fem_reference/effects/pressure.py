@@ -9,7 +9,7 @@ from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.loads import Shape, Wrench
 from fem_reference.foundations.mesh import Bools, Floats
 
-_ROUNDED = 1e-6  # rounding of the components of unit normals in files with 32 bits
+_ROUNDED = 1e-6  # rounding of the components of unit normals in files of 32-bit numbers
 
 
 class Pressure(Ramped, Load):
@@ -18,7 +18,7 @@ class Pressure(Ramped, Load):
     ``on``: the part of the surface; ``pressure``: p [MPa], inwards if positive.
 
     If the pressure acts on the entire surface of a body that can shrink freely, and the volumetric energy is K/2 (J - 1)^2, then
-    V/V0 is exactly 1 - p / K. A clamped part does not shrink, so that the body around it is sheared and V/V0 is larger. In a cube
+    V/V0 is exactly 1 - p / K. A clamped part does not shrink; the body around it is sheared, and V/V0 is larger. In a cube
     of side L with one clamped triangle with legs a, it is larger by 0.15 mu / K (a / L)^3 p / K: for example, 0.9002 instead of 0.9
     if a is L/2 and K is 10 mu.
     """

@@ -14,7 +14,7 @@ class Prestretch(Ramped, Prestrain):
     """The energies depend on ``F Fp`` with ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``: a stretch ``l = 1 + amount (stretch - 1)``
     along the fibre f at constant volume.
 
-    ``stretch``: without unit; above 1 if fibres are taut at rest.
+    ``stretch``: dimensionless; above 1 if fibres are taut at rest.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)

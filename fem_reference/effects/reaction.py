@@ -6,7 +6,7 @@ from fem_reference.effects import FieldEffect, FieldState, Place
 
 
 class Reaction(FieldEffect):
-    """``c psi``: decay if c is positive, growth if it is negative. Report eq. 4.4: ``C = c``.
+    """``c psi``: decay if c is positive, growth if it is negative. Eq. 4.4 of the report DCSE/TR-2022-03: ``C = c``.
 
     ``rate``: c [1 / time].
     """

@@ -7,11 +7,11 @@ from fem_reference.foundations.formula import Formula, evaluate
 
 
 class Source(FieldEffect):
-    """``-f``: a source of strength f. Report eq. 4.4: ``D f``.
+    """``-f``: a source of strength f. Eq. 4.4 of the report DCSE/TR-2022-03: ``D f``.
 
     ``strength``: f, a number or a formula of the coordinates [psi / time]; ``where``: everywhere, or only where y is above the mean
-    y of the mesh vertices, as in listing 4.5 of the report, line 17. In an element that the mean y cuts, f is multiplied by the
-    fraction of the element above it.
+    y of the mesh vertices, as in line 17 of listing 4.5 of the report. In an element that extends to both sides of the mean y, f is
+    multiplied by the fraction of the element above it.
     """
 
     example: ClassVar[dict[str, Any]] = {"strength": "x*y", "where": "everywhere"}

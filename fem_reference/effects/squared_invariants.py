@@ -1,4 +1,4 @@
-"""Isotropic elastic law of two squared constraints, as in the XPBD solver of Newton; at rest it does not resist shear."""
+"""Isotropic elastic law of two squared constraints, as in the physics engine Newton; at rest it does not resist shear."""
 
 from typing import Any, ClassVar
 
@@ -7,7 +7,8 @@ from fem_reference.foundations.units import PositivePressure
 
 
 class SquaredInvariants(Energy):
-    """``mu/2 (I1 - 3)^2 + lame/2 (J - 1)^2``: the two squared constraints of a tetrahedron in XPBD.
+    """``mu/2 (I1 - 3)^2 + lame/2 (J - 1)^2``: the two squared constraints of a tetrahedron in
+    extended position based dynamics (XPBD).
 
     ``mu``, ``lame``: the stiffnesses of the two terms [MPa]. They are not the Lame parameters: at rest the shear modulus is 0, and
     the bulk modulus is ``lame + 4 mu``. Source: Newton 1.8.0, newton/_src/solvers/xpbd/kernels.py, ``solve_tetrahedra``, whose

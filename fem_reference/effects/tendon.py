@@ -12,9 +12,9 @@ class Tendon(Interaction):
     attachment. They end at the point of this tendon on the bone.
 
     ``on``: the attachment; ``stiffness`` [N/mm]: the stiffness of all lines together, ``E A / l0`` for a tendon of modulus E and
-    cross-section A. The stiffness k of a line is its part of ``stiffness``, in proportion to the surface area at its start.
-    ``reach`` [mm]. A tendon has no tension at rest and therefore cannot be combined with ``in_situ``. Source: Zajac 1989 (Crit.
-    Rev. Biomed. Eng. 17:359), a tendon as a spring in series, here linear.
+    cross-section A. The stiffness k of a line is its share of ``stiffness``, in proportion to the surface area at its start.
+    ``reach`` [mm]: as above. A tendon has no tension at rest and therefore cannot be combined with ``in_situ``. Source: Zajac 1989
+    (Crit. Rev. Biomed. Eng. 17:359), a tendon as a spring in series, here linear.
     """
 
     example: ClassVar[dict[str, Any]] = {"on": "insertion", "stiffness": "20 N/mm", "reach": "15 mm"}

@@ -1,6 +1,6 @@
 """Viscosity of the matrix, in parallel with its elastic law (a Kelvin-Voigt material).
 
-With viscosity, short waves of an unstable state grow no faster than long waves.
+With viscosity, short waves in an unstable state grow no faster than long waves.
 """
 
 from typing import Any, ClassVar
@@ -29,7 +29,7 @@ class Viscosity(Energy):
     eta: Coefficient
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The lag of a body, estimated from its relaxation time as a fraction of its travel, and the viscous stress."""
+        """The lag of a body, estimated from its relaxation time and its travel, and the viscous stress."""
         rate = scene.in_time(scene.speed) / scene.length
         deborah = self.eta / scene.shear * rate
         rule, lag = "Deborah number, relaxation time divided by the time of the motion", 0.25 * deborah * scene.travel

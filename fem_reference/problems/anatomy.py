@@ -35,7 +35,7 @@ _SIDE = 2.0
 def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
     """The sorted vertices (k,) of the muscle's ``surface`` that ``case.attachment[i]`` attaches to a bone with ``bone_surface``.
 
-    Raises InputError that names the invalid key of the case, or the file and its row (comment lines do not count).
+    Raises an InputError that names the invalid key of the case, or the file and its row (comment lines do not count).
     """
     attachment = case.attachment[i]
     key = f"attachment[{i}]"
@@ -76,7 +76,7 @@ def tendon_of(case: MuscleCase, i: int) -> Floats | None:
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
-    """The outward boundary triangles (m, 3) of a ``mesh`` that count as attached, if the mesh does not follow the rim of the
+    """The boundary triangles (m, 3), oriented outwards, that count as attached in a ``mesh`` that does not follow the rim of the
     attachment.
 
     A triangle is attached if its attached share, averaged over seven sample points, is above 1/2. ``surface``: the surface that the
@@ -153,8 +153,8 @@ def _longest_side(surface: Surface) -> float:
 
 
 def fan(points: Floats) -> Surface:
-    """A fan of triangles between the centroid of ``points`` (n, 3) and each two neighbouring points. Neighbours follow each other
-    in the order of their angles in the best-fit plane.
+    """A fan of triangles between the centroid of ``points`` (n, 3) and each pair of neighbouring points. Neighbours are consecutive
+    in the order of the angles in the best-fit plane.
     """
     centre = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - centre)
@@ -186,7 +186,7 @@ log = logging.getLogger(__name__)
 
 # Fibres are traced in a separate mesh of about this number of tetrahedra.
 TETS = 8000
-# Lines traced for each required surface fibre; the outermost lines, just below the surface, become the surface fibres.
+# The number of lines traced for each required surface fibre; the outermost, just below the surface, become the surface fibres.
 _OUTER = 5
 
 

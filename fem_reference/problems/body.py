@@ -70,7 +70,7 @@ def facet_corners(kind: Kind) -> list[tuple[int, ...]]:
 
 
 def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, ...], place: str) -> None:
-    """Raise InputError that names ``place`` unless the ``element``, a key of ``ELEMENTS``, suits the cells and the effects.
+    """Raise an InputError that names ``place`` unless the ``element``, a key of ``ELEMENTS``, suits the cells and the effects.
 
     The displacement must have at least the ``degree`` of the cells. The element must have a pressure if and only if an effect needs
     the pressure as an unknown.
@@ -90,7 +90,7 @@ def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, 
 
 
 def check_stiffness(effects: tuple[Effect, ...], place: str) -> None:
-    """Raise InputError that names ``place`` unless laws resist both shear and a change of volume at rest; fibres resist neither."""
+    """Raise an InputError that names ``place`` unless laws resist both shear and volume change at rest; fibres resist neither."""
     found = moduli(effects)
     for kind, modulus, law in (("shape", found.shear, "neo_hooke"), ("volume", found.bulk, "incompressible")):
         if not modulus > 0:
@@ -106,7 +106,7 @@ def check_quadrature(element: str, degree: int | None, place: str) -> None:
 
 def reference_nodes(kind: Kind, degree: int) -> Floats:
     """The positions (k, 3) of the nodes of the reference cell (the unit tetrahedron or the unit cube), in the order of
-    ``Cells.cells``: the corners, sorted by (z, y, x), and for degree 2 then the other nodes, sorted in the same way.
+    ``Cells.cells``: the corners, sorted by (z, y, x), and then, for degree 2, the other nodes, sorted in the same way.
     """
     ticks = np.arange(3) / 2
     x, y, z = (axis.ravel() for axis in np.meshgrid(ticks, ticks, ticks, indexing="ij"))
@@ -160,7 +160,7 @@ class Prescribed:
     anchor: tuple[float, float, float] | None = None
 
     def displacements(self, points: Floats, frame: float) -> Floats:
-        """The displacements (n, 3) [mm] of ``points`` (n, 3), 0 along axes without prescription. InputError if the path fails."""
+        """The displacements (n, 3) [mm] of ``points`` (n, 3), 0 along axes that are free. Raises InputError if the path fails."""
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:
             found = np.asarray(self.path(np.array(points), frame))
@@ -197,8 +197,8 @@ class Body:
     A load acts on the facets of the region that its ``on`` names. ``contact``: the law of contact with all ``bones``, None without
     contact. ``touching``: the laws of contact between parts of the surface. ``interval`` [s]: the time between consecutive frame
     numbers, None if nothing depends on time. ``start``: a function from rest points (n, 3) to their positions at ``frames[0]``.
-    ``regions``: the regions in which effects act, by name. ``within``: the range of cells of each region that is limited to one of
-    several pieces of the mesh, by name.
+    ``regions``: the regions in which effects act, by name. ``within``: the ranges of cells to which
+    regions in one of several pieces of the mesh are limited, by the name of the region.
     """
 
     mesh: Cells

@@ -131,7 +131,7 @@ def nearest_at_rest(name: str, bone: Obstacle, points: Floats) -> float:
 
 
 def check_bone(place: str, surface: Surface, shape: Obstacle, muscle: Surface, apart: float) -> None:
-    """Raise InputError for a bone entirely inside the muscle, as no force would push it out, or a bone that is too thin for contact
+    """Raise InputError for a bone entirely inside the muscle, as no force would push it out, or for a bone too thin for contact
     points with a spacing of ``apart`` [mm].
     """
     if signed_distances(surface.points, muscle).max() < 0:

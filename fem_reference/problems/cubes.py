@@ -42,8 +42,8 @@ def nominal_stress(acting: Sequence[Effect], F: Floats, fibre: Floats) -> Floats
 
 
 def loaded(acting: Sequence[Effect], stretches: Sequence[float | None], fibre: Floats) -> CubeState:
-    """The state of a cube at ``stretches`` along x, y and z. A stretch is ``FREE`` along an axis without stress; at least one is
-    given.
+    """The state of a cube at ``stretches`` along x, y and z. A stretch is ``FREE`` along an axis without stress; at least one
+    stretch is a number.
 
     The ``fibre`` direction is in the plane of x and y. If it is at an angle to the load, the cube is sheared (lines along y lean
     towards x) until no shear stress acts. It is then in tension or compression along x alone, like material far from the plates of

@@ -19,23 +19,23 @@ from fem_reference.scenes.muscle import MuscleCase
 
 # An effect is negligible if it moves the surface by less than this fraction of the size of tetrahedra, or of the maximum
 # displacement (travel) of the surface if this is smaller. Error bars of the surface (rms) are 0.03 to 0.14 of the size and 0.01 to
-# 0.05 of the travel; error bars of fibre lengths and volumes are smaller if only these change.
+# 0.05 of the travel. If an effect changes only fibre lengths and volumes, their error bars are smaller.
 TOLERANCE = 0.005
-# The negligible change of stress by an effect, relative to the stress of the other effects, and the smallest strain assumed for it.
+# The maximum negligible stress of an effect, relative to that of the others, and the minimum strain assumed for the others.
 STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
-# The assumed error of the guessed position of a point, as a fraction of its path past a bone (0.83 in `hip_flexion`).
+# The assumed error of the guessed position of a point, as a fraction of its path past a bone (actually 0.83 in `hip_flexion`).
 _DOUBT = 1.0
 # The numbers of sampled frames, evenly spread, and of sampled vertices.
 _FRAMES, _VERTICES = 9, 1500
 _PLACES = 6000  # the number of contact points sampled for their distance to bones
 _ALONG = 0.7  # triangles are sampled for the stretch along a direction if its component in their plane is above this
-_STILL = 1e-6  # motion [mm] that is only round-off
+_STILL = 1e-6  # motion [mm] up to this is only round-off
 _FELT = 1.0  # a distance [mm] from a bone that exceeds any smoothing of contact
 
 
 @dataclass(frozen=True)
 class Decision:
-    """The decision whether an ``effect`` is ``needed``. ``indicator``: the estimates for the effect, None for a part of the
+    """The decision on whether an ``effect`` is ``needed``. ``indicator``: the estimates for the effect, None for a part of the
     material; ``bound`` [mm], ``stress_bound`` [MPa]: their allowed values. ``turned_out``: the frame whose solution showed that the
     effect is needed, None if estimates showed it. ``listed``: True if the effect acts whether it is needed or not. ``of``: the name
     of the muscle if the effect acts in only one of several muscles, otherwise empty.
@@ -104,7 +104,7 @@ def decision(effect: Effect, found: Indicator | None, known: Estimates) -> Decis
 
 def solved(known: Estimates, rest: Setup, bones: tuple[Bone, ...], number: float, at: Floats) -> Estimates:
     """The ``known`` estimates, updated from a solved frame. ``number``: the frame number; ``at`` (n, 3): the positions of the
-    surface, whose nearness to ``bones`` is measured.
+    surface, whose nearness to ``bones`` is computed.
     """
     chosen, felt = _chosen(rest), rest.exempt.places(_PLACES)
     points, moved = rest.surface.points[chosen], at[chosen]

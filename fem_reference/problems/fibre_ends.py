@@ -12,8 +12,8 @@ from fem_reference.geometry.distance import Distances, distances
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.problems.setup import AttachedVertices
 
-# The maximum distance [mm] at which an end counts as reaching its attachment. So near to it, the muscle practically moves with the
-# bone.
+# The maximum distance [mm] at which an end counts as reaching its attachment. This close to it, the muscle practically moves with
+# the bone.
 REACHES = 2.0
 SIDES = ("first", "last")  # the ends of a fibre
 
@@ -63,7 +63,7 @@ class FibreEnds:
         return np.asarray(np.linalg.norm(ends - self.taken(rest, frame), axis=2))
 
     def beyond(self, ends: Floats, frame: float) -> Floats:
-        """The lengths (k,) [mm] of the straight tendons of each fibre at a ``frame``, with both ends added; 0 without tendons.
+        """The lengths (k,) [mm] of the straight tendons of each fibre at a ``frame``, summed over both ends; 0 without tendons.
 
         ``ends`` (k, 2, 3) [mm]: the ends of the fibres at this frame.
         """
@@ -162,8 +162,8 @@ def _steps(start: Floats, end: Floats) -> Floats:
 
 
 def _covered(part: Floats, ends: Floats, fibres: int) -> float:
-    """The fraction of the area of the triangles ``part`` (r, 3, 3) that is covered by ``ends`` (m, 3): their centroids are within
-    the mean spacing of the fibres from an end. ``fibres``: the number of fibres.
+    """The fraction of the area of the triangles ``part`` (r, 3, 3) that is covered by ``ends`` (m, 3). A triangle is covered if
+    its centroid is within the mean spacing of the fibres from an end. ``fibres``: the number of fibres.
     """
     areas = corner_areas(part)
     if len(ends) == 0 or not areas.sum():

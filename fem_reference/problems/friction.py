@@ -1,4 +1,4 @@
-"""Coulomb friction of points on a surface: a spring keeps a point in place until its force exceeds the limit; then it slides."""
+"""Coulomb friction on a surface: a spring keeps a point in place until its force exceeds the limit; then the point slides."""
 
 from collections.abc import Iterable
 from math import isfinite
@@ -33,7 +33,8 @@ class Returned(NamedTuple):
 
 
 def returned(slip: Floats, limit: Floats, stiffness: float) -> Returned:
-    """The traction ``min(k s, L)`` of friction by return mapping (Giannakopoulos 1989, doi 10.1016/0045-7949(89)90175-4).
+    """The secant stiffness of friction with the traction ``min(k s, L)``, by return mapping (Giannakopoulos 1989,
+    doi 10.1016/0045-7949(89)90175-4).
 
     ``slip``: the elastic slip s (n,) [mm]; ``limit``: the limit L (n,) [MPa] of the traction; ``stiffness``: k [MPa/mm].
 

@@ -1,4 +1,4 @@
-"""Guesses of the path of a muscle, from the motion of its bones, and of its shape as a beam, before it is solved."""
+"""Guesses of the path of a muscle, from the motion of its bones, and of its shape as a beam, before the case is solved."""
 
 from dataclasses import dataclass, replace
 
@@ -48,8 +48,8 @@ def distance(bone: Bone, points: Floats) -> Floats:
 
 def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float, float, float, float]:
     """The maximum speed, speed perpendicular to an ``axis`` (3,), jump in velocity, and acceleration of a ``guess``, in this order,
-    per frame number. Each is a root mean square over the points. A jump is a change of velocity that is much greater than the
-    changes at most frames.
+    with frame numbers as time. Each is a root mean square over the points. A jump is a change of velocity of more than five times
+    the median change.
     """
     some = slice(None, None, max(1, len(guess.points) // 100))
     guess = replace(guess, points=guess.points[some], weights=guess.weights[some])
@@ -117,7 +117,7 @@ def axis_of(rest: Setup) -> Floats:
 def sag(rest: Setup, frames: list[int], travel: float) -> float:
     """The deviation [mm] of the muscle's axis from the straight line between two attachments. It is the sum of three parts: the
     deviation at rest in the middle third, the deviation due to rotating bones, and 1/20 of the ``travel`` [mm] (a sideways shift
-    bends the axis into two stiffer waves).
+    bends the axis into two waves, which are stiffer than one).
     """
     if len(rest.attached) < 2:
         return 0.0
@@ -130,7 +130,7 @@ def sag(rest: Setup, frames: list[int], travel: float) -> float:
 
 
 def turn(rest: Setup, frame: float) -> float:
-    """The rotation [rad] of the last attached bone relative to the first attached bone at a ``frame``, since rest."""
+    """The rotation [rad] of the last attached bone relative to the first attached bone, from rest to a ``frame``."""
     first, last = (rest.attached[i].bone.pose(frame)[:3, :3] for i in (0, -1))
     return float(Rotation.from_matrix(first.T @ last).magnitude())
 

@@ -76,7 +76,7 @@ class Share:
 def join(bodies: Mapping[str, Body], touching: tuple[Touching, ...] = ()) -> Body:
     """Join ``bodies``, by name, into one body. ``touching``: the laws of contact between facets of the joined body.
 
-    Effects that all bodies have act everywhere; any other effect acts in the cells of its body. Raises InputError if the bodies
+    Effects common to all bodies act everywhere; any other effect acts in the cells of its body. Raises InputError if the bodies
     differ in properties that they must share.
     """
     ends = np.cumsum([0, *(len(one.mesh.cells) for one in bodies.values())]).tolist()

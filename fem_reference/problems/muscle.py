@@ -140,7 +140,7 @@ class MuscleProblem(Setup):
 
 
 def setup(case: MuscleCase) -> Setup:
-    """Read and check the surfaces of a case, and choose its attached vertices. Raises InputError that names the invalid part."""
+    """Read and check the surfaces of a case, and choose its attached vertices. An InputError names the invalid part."""
     place = join(case.place, "muscle.surface")
     surface = files.read_surface(case.file(case.muscle.surface, "muscle.surface"), case.muscle.unit)
     surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))

@@ -168,7 +168,7 @@ def _surfaces(parts: Iterable[Setup]) -> Surface:
 
 
 def setup(case: MusclesCase) -> MusclesSetup:
-    """Read and check the surfaces of all muscles, and find the pairs that may touch. InputError names the invalid part."""
+    """Read and check the surfaces of all muscles, and find the pairs that may touch. An InputError names the invalid part."""
     found = dict[str, Setup]()
     for i, part in enumerate(case.parts):
         with case.placed(i):
@@ -188,8 +188,8 @@ def build(case: MusclesCase, rest: MusclesSetup) -> MusclesProblem:
 
 
 def _gaps(case: MusclesCase, muscles: Mapping[str, Setup], felt: float) -> dict[tuple[str, str], float]:
-    """A lower bound [mm] on the distance between each two muscles over all frames, by the names of both. It allows for bulging, the
-    pressure of bones and loads, unless the motion of the bones alone may already bring the muscles within ``felt`` [mm].
+    """A lower bound [mm] on the distance between each pair of muscles over all frames, by their names. It allows for bulging, loads
+    and the pressure of bones, unless the motion of the bones alone may already bring the muscles within ``felt`` [mm].
     """
     parts, found = dict(zip(muscles, case.parts, strict=True)), dict[tuple[str, str], float]()
     beyond = cache(lambda name: _beyond(parts[name], muscles[name]))
@@ -246,7 +246,7 @@ def _instants(bone: Bone, frames: Sequence[int]) -> Floats:
 
 
 def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
-    """The decision on each effect. An effect on all muscles is needed if any muscle needs it; contact, if two muscles come near."""
+    """The decision on each effect. An effect on all muscles is needed if any muscle needs it, and contact if two come near."""
     found = [decisions(part, one) for part, one in zip(case.parts, rest.muscles.values(), strict=True)]
     every: list[Decision] = []
     for effect in case.effects:
@@ -271,7 +271,7 @@ def _touches(case: MusclesCase, rest: MusclesSetup, effect: MuscleContact) -> De
 
 
 def needed(case: MusclesCase, found: tuple[Decision, ...]) -> MusclesCase:
-    """A copy of the case with only the effects that the decisions ``found`` need, on all muscles and on single muscles."""
+    """A copy of the case with only the effects that are needed according to the decisions ``found``, on all or single muscles."""
     kept: list[Any] = [one.effect for one in found if one.needed]
     own = tuple(
         one.model_copy(

@@ -205,7 +205,7 @@ def scalar_case(case: Case) -> ScalarCase:
 
 
 def setup(case: Case) -> CaseSetup:
-    """The set-up of a case. Raises InputError that names the invalid part."""
+    """The set-up of a case. Raises an InputError that names the invalid part."""
     if isinstance(case, MusclesCase):
         return muscles.setup(case)
     return muscle.setup(case) if isinstance(case, MuscleCase) else scalar.build(scalar_case(case))

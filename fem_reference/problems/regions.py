@@ -62,7 +62,7 @@ def _depth(case: MuscleCase, i: int, rest: Setup, fill: Callable[[float], TetMes
 
 
 def facts(rest: Setup) -> dict[str, str]:
-    """The volume of each region of a muscle, and of the overlap of each two regions, in words."""
+    """The volume of each region of a muscle, and of the overlap of each pair of regions, in words."""
     points, volume = samples(rest.surface), enclosed_volume(rest.surface.points, rest.surface.triangles)
     shares = {name: region(points) for name, region in rest.regions.items()}
 

@@ -90,7 +90,7 @@ class FieldProblem:
 
 
 def build(case: ScalarCase, refinements: int = 0) -> FieldProblem:
-    """The problem of a case whose mesh is refined ``refinements`` times. Raises InputError that names the invalid part."""
+    """The problem of a case whose mesh is refined ``refinements`` times. An InputError names the invalid part."""
     mesh = check(mesh_of(case))
     dimension = mesh.points.shape[1]
     _check_effects(case, mesh)
@@ -180,7 +180,7 @@ def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
 
 
 def _between(mesh: FieldMesh, values: Floats) -> Floats:
-    """The values (e,) at the midpoints of edges: on the rim the mean of the ``values`` at both ends; NaN inside or without both."""
+    """The values (e,) at the midpoints of edges: on the rim the mean of the ``values`` at the ends; NaN inside or if one is NaN."""
     edges = mesh.edges
     middles = np.full(len(edges), np.nan)
     if mesh.cells.shape[1] == 3:
@@ -240,7 +240,7 @@ def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
 
 
 def mesh_of(case: ScalarCase) -> FieldMesh:
-    """The mesh of a scalar case. Raises InputError that names the invalid part."""
+    """The mesh of a scalar case. Raises an InputError that names the invalid part."""
     domain = case.domain
     if domain.mesh is not None:
         return _mesh_files(case, domain.mesh)

@@ -190,7 +190,7 @@ def _patches(place: Callable[[Floats, Floats, Floats], Floats], counts: Counts, 
 
 
 def _square(flat: Floats, half: float) -> Floats:
-    """Points (n, 2) in the unit disc, of the rounded square of half side ``half``, for coordinates ``flat`` (n, 2) in [-1, 1]."""
+    """Points (n, 2) of the rounded square of half side ``half`` in the unit disc, for coordinates ``flat`` (n, 2) in [-1, 1]."""
     return np.asarray(half * flat * (1 + _BULGE * (1 - flat[:, ::-1] ** 2)))
 
 
@@ -234,7 +234,7 @@ def _disc(place: Map, half: float, counts: Counts, faces: dict[str, str], *, qua
 def cylinder(radius: float, length: float, rings: int, slices: int, kind: Kind, degree: int) -> Cells:
     """A solid cylinder with a ``radius`` and a ``length`` [mm] along z, beginning at the origin.
 
-    In each of the ``slices``, ``rings`` of cells surround a rounded square with twice as many cells along each side. Faces: bottom,
+    In each of the ``slices``, ``rings`` of cells surround a rounded square with 2 ``rings`` cells along each side. Faces: bottom,
     top, side.
     """
     faces = {"z0": "bottom", "z1": "top", "x1": "side"}

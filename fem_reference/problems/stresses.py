@@ -114,7 +114,7 @@ def _added(acting: Acting, one: tuple[Effect, float], now: Floats, stress: Calla
 
 
 def _stretches(acting: Acting, F: Floats, fibre: Floats | None, volumes: Floats) -> tuple[float, float]:
-    """The smallest and the greatest fibre stretch in the energies; a hundredth of the volume at each extreme is left out."""
+    """The smallest and the greatest elastic stretch of fibres; a hundredth of the volume at each extreme is left out."""
     if fibre is None:
         return 1.0, 1.0
     state = elastic_state(acting, State([list(row) for row in np.moveaxis(F, 0, -1)], fibre=list(fibre.T)))
@@ -130,9 +130,9 @@ def _mean(stress: Floats, volumes: Floats) -> float:
 class Watch:
     """A watch on the influence that the omitted effects of a ``case`` would have on the frames of a run, as these are solved.
 
-    The stresses of omitted and of acting effects follow from a solved state without another solution. They are compared with the
-    stress of the acting effects: during a run, with the maximum of the ``known`` estimate and the stresses so far; at the end, with
-    the maximum of all stresses. ``frames``: the surface (n, 3) of each frame, and the stresses in its tetrahedra, None without any.
+    The stresses of omitted and of acting effects follow from a solved state without another solution. The former are compared with
+    the latter: during a run, with the maximum of the ``known`` estimate and the stresses so far; at the end, with the maximum of
+    all stresses. ``frames``: the surface (n, 3) of each frame, and the stresses in its tetrahedra, None without any.
     """
 
     def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:
@@ -196,7 +196,7 @@ class Watch:
         return decision(effect, found, now)
 
     def _moving(self, now: Estimates, number: float) -> Estimates:
-        """The estimates ``now``, updated with the motion of the solved surface up to frame ``number``, which loads cause too."""
+        """The estimates ``now``, updated with the motion of the solved surface up to frame ``number``, as loads move it too."""
         before = [earlier for earlier in sorted(self.frames) if earlier < number][-2:]
         if not before:
             return now

@@ -24,15 +24,15 @@ class Touching:
     ``friction``: the coefficient of Coulomb's law, as in ``ContactLaw``; None without friction.
 
     ``relaxed``: two frame numbers between which an overlap at rest is removed, as with bones. If it is None, an overlap of two
-    parts causes pressure at once, and an overlap of a part with itself causes pressure only after it has opened.
+    parts causes pressure at once; an overlap of a part with itself causes pressure only if it grows, or closes again after opening.
 
     ``around``: True if points of each part also touch the skin around the other part, such as attached skin. Otherwise a point that
     slides past the rim of the other part ends the run. The skin around a part has no contact points, so contact there is half as
     stiff: the mean traction is half the reported pressure, and half the area counts.
 
     ``own_normals``: True if the gap is measured along the normals of the points instead of to the nearest point. This requires two
-    different parts, because behind a part that touches itself is the part itself, and no friction, because slip is measured from
-    the nearest point.
+    different parts, because a line along a normal of a part that touches itself also meets this part behind the point. It excludes
+    friction, because slip is measured from the nearest point.
     """
 
     one: str

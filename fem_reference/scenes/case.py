@@ -20,7 +20,7 @@ from fem_reference.foundations.markup import fact_table
 from fem_reference.foundations.records import FileName, Name, Record, join
 
 DATA_SETTING = "FEM_REFERENCE_DATA"
-# The environment variable that lists further folders from which scene files may read files, separated as in PATH.
+# The environment variable that lists, separated as in PATH, further folders from which scene files may read files.
 ALLOWED_SETTING = "FEM_REFERENCE_FILES"
 COMMAND = "command"  # the solver that runs a program; a scene file cannot choose this solver
 DELAUNAY = "delaunay"  # the word that stands in place of the name of a file of triangles
@@ -50,7 +50,7 @@ class SolverChoice(Record):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Every key except the keys that choose the solver."""
+        """Every key except ``solver`` and, in a candidate, ``name``."""
         return dict(self.model_extra or {})
 
 

@@ -31,7 +31,7 @@ def read(case: str | Path, *, with_negative_control: bool = False, changes: dict
     """Read a shipped case by name, or the case in a folder or a file. A case with a ``domain`` has a scalar field.
 
     ``changes``: new values by key, such as ``"frames.last"`` or ``"effect[1].bulk"``. ``with_negative_control``: True to apply the
-    negative control of the case. The negative control is checked even if it is not applied, unless only other keys are changed.
+    negative control of the case. It is checked even if it is not applied, unless ``changes`` has only other keys.
     """
     path = _scene_file(case)
     table = texts.toml(path)
@@ -116,7 +116,7 @@ def read_muscle(case: str | Path, changes: dict[str, Any] | None = None) -> Musc
 
 
 def muscle(case: Case, place: str | None = None) -> MuscleCase:
-    """The ``case`` itself, if it has a single muscle. Otherwise raises InputError at ``place``, by default the file of the case."""
+    """The ``case`` itself if it has one muscle. Otherwise an InputError names ``place``, by default the file of the case."""
     if not isinstance(case, MuscleCase):
         kind = "a case of several muscles" if isinstance(case, MusclesCase) else "a scalar case"
         raise InputError(place or case.place, f'"{case.name}", {kind}', "the case of a muscle")

@@ -36,7 +36,7 @@ def check_names(case: MuscleCase) -> None:
 
 
 def _check_loads(case: MuscleCase) -> None:
-    """Raise InputError if a load acts on an exact attachment: the bone would carry it, and nothing would deform."""
+    """Raise InputError if a load acts on an exact attachment: the bone would carry the load, and nothing would deform."""
     exact = [attachment.name for attachment in case.attachment if attachment.stiffness is None]
     for i, effect in enumerate(case.effects):
         if isinstance(effect, Load) and effect.on in exact:

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 from fem_reference.foundations.records import Record, directed, one_of
 from fem_reference.foundations.units import Angle, LengthUnit
 
-# The maximum pennation [rad]. With a greater pennation, all fibres of a template would be shorter than the muscle is wide.
+# The maximum pennation [rad]. At this pennation, the fibres of a template are at most 1.15 times as long as the muscle is wide.
 _STEEPEST = math.radians(60)
 
 
@@ -60,7 +60,8 @@ class KohoutKukacka(Record):
 
 
 class Chmd(Record):
-    """Fibres interpolated between fibres on the surface of the muscle. ``count``: the number of fibres.
+    """Fibres interpolated by the method CHMD of Kohout and Cholt between fibres on the surface of the muscle. ``count``: the number
+    of fibres.
 
     ``heads``: a file for each head of the muscle, with three or more fibres around the head. ``around``: instead of files, fibres
     that are traced along a Laplace field just below the surface.
@@ -87,8 +88,8 @@ class Fibres(Record):
     ``turned``: a rotation from the directions of these fibres to the fibre directions of the material, the same at all points.
     Lengths are still measured along the fibres as given.
 
-    ``complete``: True to extend each fibre that ends more than 2 mm from its attachment, in the muscle or along its surface, to the
-    nearest point of the attachment. Fibres are not extended to an attachment with a ``tendon``.
+    ``complete``: True to extend each fibre that ends more than 2 mm from its attachment to the nearest point of the attachment, in
+    a straight line or, where this leaves the muscle, along its surface. Fibres are not extended to an attachment with a ``tendon``.
     """
 
     polylines: PolylineFile | None = None

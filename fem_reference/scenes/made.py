@@ -18,7 +18,7 @@ def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "c
     """Make a case from a ``table`` with the keys of a ``case.toml``, but without a file.
 
     A table with a ``domain`` is the case of a scalar field; any other table is the case of a muscle. A quantity is text with a
-    unit, or a number in mm, N, MPa, s, rad and tonne. An effect is a table or a result of :func:`fem_reference.make_effect`. The
+    unit, or a number in mm, N, MPa, s, rad or tonne. An effect is a table or a result of :func:`fem_reference.make_effect`. The
     keys ``candidate``, ``expect`` and ``negative_control`` are optional. File names are relative to ``folder``. ``name``: the name
     of the case on pages. Raises InputError if a key is missing, unknown or invalid; the message names the key, the given value and
     the expected value. ``cases/hip_flexion/case.toml`` explains each key.

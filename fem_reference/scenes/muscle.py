@@ -182,7 +182,7 @@ class Shift(Record):
 
 class Outline(Record):
     """The vertices of the muscle surface within the distance ``reach`` of patches on the bone. Each of the ``clouds`` of landmarks
-    in ``file`` spans a patch. ``shift``: a displacement of the landmarks alone.
+    in ``file`` spans a patch. ``shift``: a displacement of the landmarks but not of the fibres.
     """
 
     file: str
@@ -251,7 +251,7 @@ class Uncertain(Range):
 
 class DrivenCase(Case):
     """The case of one or several muscles driven by bones. ``choice`` (the key ``effects``): ``"listed"`` if all listed effects act,
-    ``"auto"`` if only the effects act that the case needs.
+    ``"auto"`` if only the effects that are needed act.
     """
 
     choice: Literal["listed", "auto"] = Field(default="listed", alias="effects")

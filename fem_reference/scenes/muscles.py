@@ -99,7 +99,7 @@ class MusclesCase(DrivenCase):
 
     @contextmanager
     def placed(self, i: int) -> Iterator[None]:
-        """A context that gives an InputError about the separate case of muscle ``i`` the corresponding place in the scene."""
+        """A context in which an InputError about the separate case of muscle ``i`` gets the corresponding place in the scene."""
         try:
             yield
         except InputError as error:
@@ -163,7 +163,7 @@ def exactly_attached[C: DrivenCase](case: C) -> C:
 def alone(table: dict[str, Any], place: str) -> dict[str, Any]:
     """The ``table`` of a scene, rewritten as for a single muscle if its list of muscles has one entry, otherwise unchanged.
 
-    Raises InputError that names ``place`` if the muscle and the scene state the same key.
+    Raises an InputError that names ``place`` if the muscle and the scene state the same key.
     """
     listed = table.get("muscle")
     if not isinstance(listed, list) or len(listed) != 1 or not isinstance(listed[0], dict):

@@ -41,7 +41,7 @@ def number(case: Case, key: str) -> float:
 
 
 def unit(case: Case, key: str) -> str:
-    """The internal unit of the number at a ``key``; empty for a number without unit."""
+    """The internal unit of the number at a ``key``; empty for a dimensionless number."""
     return field_unit(_field(case, key))
 
 

@@ -8,7 +8,7 @@ from fem_reference.foundations.records import join
 from fem_reference.scenes import numbers
 from fem_reference.scenes.muscle import MuscleCase
 
-# Keys outside of effects whose numbers may vary, because they do not affect the measured fibres, bones and frames.
+# The keys, apart from those of effects, of numbers that may vary, because they do not affect the measured fibres, bones and frames.
 _OTHERS = re.compile(r"attachment\[\d+\]\.(stiffness|outline\.shift\.by)|fibres\.turned\.angle")
 _VARIED = (
     "a number of an effect, the stiffness or outline.shift.by of an attachment, or fibres.turned.angle: "
@@ -41,7 +41,7 @@ def left_out(case: MuscleCase) -> list[str]:
 def ends(case: MuscleCase, key: str, one: Range, place: str) -> tuple[float, float]:
     """The lower and the upper end of the range ``one`` of the number at a ``key``, in the internal unit of the number.
 
-    Raises InputError that names ``place`` if the ends are invalid.
+    Raises an InputError that names ``place`` if the ends are invalid.
     """
     found = []
     for name in ("low", "high"):

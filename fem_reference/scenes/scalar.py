@@ -29,7 +29,7 @@ class Interval(Record):
 
 
 class MeshFiles(Record):
-    """Triangles in the format of listing 4.5 of the report: comma-separated files without a header.
+    """Triangles in the format of listing 4.5 of the report DCSE/TR-2022-03: comma-separated files without a header.
 
     ``points``: a file with a row of 2 or 3 coordinates for each vertex. ``triangles``: a file with a row of three vertex numbers,
     counted from 1, for each triangle; or the word ``delaunay`` for a Delaunay triangulation of points in the plane.
@@ -64,8 +64,8 @@ class Boundary(Record):
     ``value`` of the field (Dirichlet) or its ``slope`` along the outward normal (Neumann). A formula ``where`` limits the condition
     to facets at all of whose vertices the formula is positive.
 
-    The second form has the key ``bounds`` alone: a file in the format of listing 4.5 of the report, with a row of vertex numbers,
-    counted from 1, and a row of the values that are prescribed at these vertices.
+    The second form has the key ``bounds`` alone: a file in the format of listing 4.5 of the report DCSE/TR-2022-03, with a row of
+    vertex numbers, counted from 1, and a row of the values that are prescribed at these vertices.
     """
 
     on: Literal["left", "right", "rim"] | None = None
@@ -121,7 +121,7 @@ class ScalarCase(Case):
         return (0,)
 
     def standards(self, of: str) -> frozenset[Standard]:
-        """The standards against which a run is measured, for a field, which has no rest state; ``of``: as in ``Case.standards``."""
+        """The standards against which a run is measured; a field has no rest state. ``of``: as in ``Case.standards``."""
         found: set[Standard] = {"itself"}
         if self.exact is not None:
             found.add("exact")
