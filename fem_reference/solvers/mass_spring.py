@@ -29,7 +29,7 @@ from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advanc
 
 # The default time step divided by the largest stable time step.
 SHARE_OF_STABLE = 0.9
-# The maximum number of time steps per frame number; these take more than two seconds with 3,000 tetrahedra.
+# The maximum number of time steps per frame number; this many take more than two seconds with 3,000 tetrahedra.
 _MOST_STEPS = 100_000
 # The number of time steps in one call of compiled code. A user can interrupt a run only between two calls.
 _AT_ONCE = 200
@@ -49,12 +49,12 @@ def _damping(text: object) -> float | str:
 class MassSpringSettings(Record):
     """Stiffness, density, loads and time steps of the mass-spring system.
 
-    ``stiffness``: the stiffness of each spring. ``density``: the density of the muscle, whose mass is divided equally among the
-    masses: equilibrium without gravity does not depend on them, and a single small mass would make every time step small.
+    ``stiffness``: the stiffness of each spring. ``density``: the density of the muscle, which is divided into equal masses: a
+    single small mass would make every time step small, and equilibrium without gravity does not depend on the masses.
     ``frame_time``: the time between two frame numbers in this solver, which replaces the interval of the scene; the longer it is,
-    the closer the muscle comes to equilibrium. ``damping``: the coefficient c, or ``"eq. 5.5"`` for the value of
-    ``report_damping``; by default there is no damping. ``gravity``: an acceleration, by default none. ``collision``: contact with
-    bones after every time step, by default none. ``time_step``: the maximum time step, by default 0.9 of the stable time step.
+    the closer the muscle comes to equilibrium. ``damping``: the damping coefficient, or ``"eq. 5.5"`` for its value by eq. 5.5 of
+    the report; by default there is no damping. ``gravity``: an acceleration, by default none. ``collision``: contact with bones
+    after every time step, by default none. ``time_step``: the maximum time step, by default 0.9 of the stable time step.
     """
 
     stiffness: Stiffness
@@ -86,7 +86,7 @@ def report_damping(mass: float, stiffness: float) -> float:
     """The damping coefficient c = 2 sqrt(2 m (2 + 4 / k_a)) [N s/mm] of eq. 5.5, for a ``mass`` m [tonne] and a ``stiffness`` k_a
     [N/mm].
 
-    The equation adds a constant to the reciprocal of a stiffness, so it holds in a single system of units, which the report does
+    The equation adds a constant to the reciprocal of a stiffness, so it holds in only one system of units, which the report does
     not state. In SI units (kg, N/m, N s/m), which are used here, c is the critical damping 2 sqrt(m k) of a mass on a spring of
     stiffness k = 4 + 8 / k_a. This k equals k_a for k_a = 2 + sqrt(12) = 5.46 N/m, and approaches 4 N/m for large k_a.
     """

@@ -33,7 +33,7 @@ class PbdCollision(Record):
     """Contact of bones with free vertices.
 
     ``gap`` [mm]: the minimum distance between a vertex and a bone; for a vertex that is closer at rest, the minimum is its distance
-    at rest. ``stiffness``: the fraction of the displacement out of a bone that one projection applies.
+    at rest. ``stiffness``: the fraction of the missing distance that one projection restores.
     """
 
     gap: Annotated[Length, Field(ge=0)]
@@ -116,7 +116,7 @@ def hinges_of(triangles: Ints) -> Ints:
 def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
     """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre segment nearest to the midpoint of the edge.
 
-    If several segments are equally near up to rounding, as at a kink, the first is used, also in a rotated scene.
+    If several segments are equally near up to rounding, as at a kink, the first is used, even in a rotated scene.
     """
     starts = np.setdiff1d(np.arange(len(fibres.points) - 1), fibres.offsets[1:] - 1)
     starts = starts[np.any(fibres.points[starts + 1] != fibres.points[starts], axis=1)]
