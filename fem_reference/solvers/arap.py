@@ -4,8 +4,8 @@ The edges around each vertex form a cell, which is rotated with as little distor
 which the bones have their pose of frame n; attached vertices move exactly with their bone. Starting from the previous state, the
 method alternates between the rotations of all cells (local step) and the positions of the free vertices (global step). If the rows
 of attached vertices are removed and each edge has the same weight at both ends, each step minimises eq. 5.10 over its unknowns, so
-the energy never rises. This also holds with negative weights, because the matrix is still the positive stiffness matrix of linear
-elements. Attachments by springs are treated as exact, and there is no contact.
+the energy never rises. This also holds with negative weights, because the matrix is still the positive definite stiffness matrix of
+linear elements. Attachments by springs are treated as exact, and there is no contact.
 """
 
 from collections.abc import Callable

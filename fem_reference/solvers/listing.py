@@ -26,7 +26,7 @@ SQUARE, LINEAR, CONSTANT = 26.0, 2.0, 0.05
 
 
 class ListingSettings(Record):
-    """Settings of the listings.
+    """Settings of the report's listings.
 
     ``peclet``: the Peclet number, which is the argument of listing 4.1, by default 1 as in its header. Listing 4.5 has no argument.
     """

@@ -1,9 +1,9 @@
 """A mass-spring system. Report section 5.5.1, eqs 5.3 to 5.7.
 
-This is a volumetric model, as in Table 5.1: the points of the tetrahedral mesh are masses, and its edges are springs. (In Janak's
-model the masses are points sampled on fibres and connected to nearby masses.) The displacement of the surface and of the fibres is
-interpolated from the masses. Springs resist neither a change of volume nor the inversion of a tetrahedron. Attachments are exact;
-their stiffness is ignored. Contact acts only on masses at the surface, so the surface between them may penetrate a bone.
+This is a volumetric model, as in Table 5.1: the points of the tetrahedral mesh are masses, and its edges are springs. (In another
+model, by Janak, the masses are points sampled on fibres and connected to nearby masses.) The displacement of the surface and of the
+fibres is interpolated from the masses. Springs resist neither a change of volume nor the inversion of a tetrahedron. Attachments
+are exact; their stiffness is ignored. Contact acts only on masses at the surface, so the surface between them may penetrate a bone.
 """
 
 import math

@@ -41,7 +41,7 @@ class PbdCollision(Record):
 
 
 class PbdSettings(Record):
-    """Settings of the algorithm; every key is required except ``anisotropy`` and ``collision``.
+    """Settings of the report's Algorithm 1, with its line numbers; every key is required except ``anisotropy`` and ``collision``.
 
     ``sub_iterations``: the number of steps of the algorithm in each iteration, 3 in section 6.1 of the report.
     ``solver_iterations``: the number of sweeps over all constraints in each step (line 15). ``damping``: the fraction of each

@@ -59,7 +59,7 @@ DIGITS = 12
 
 
 class ProgramSettings(Record):
-    """Settings of the program; every key is required except ``voxels`` and ``anisotropy``.
+    """Settings of the report's program; every key is required except ``voxels`` and ``anisotropy``.
 
     ``sub_iterations``: the number of steps in each iteration, 3 in section 6.1 of the report. ``damping``: the fraction of each
     velocity that is lost in a step, 0.01 in the program. ``bending``: a factor on the correction of dihedral angles, 0.9 in the

@@ -45,7 +45,7 @@ ABOUT = "candidate.toml"
 
 
 class RecordedSettings(Record):
-    """The location of the sequence and its unit of length.
+    """The location of the recorded frames and their unit of length.
 
     ``folder``: a folder with a mesh file for each frame, whose frame number is the last number in the file name; a .pvd or .xdmf
     file, or a folder that contains such a file; or the folder of a stored run.

@@ -40,7 +40,7 @@ _AROUND, _CARRIERS = 6, 12
 
 class ViperSettings(Record):
     """``points``: number of points of each rod. ``iterations``: sweeps over all constraints from each frame number to the next.
-    ``stretch``, ``bending``, ``volume``, ``bundle``: stiffness of each kind of constraint in a sweep, from 0 (off) to 1.
+    ``stretch``, ``bending``, ``volume``, ``bundle`` (shape matching): stiffness of these constraints in a sweep, from 0 (off) to 1.
     ``contact``: if true, the distance of each rod point from bones is at least the rod radius (or its distance at rest, if that is
     less), and the surface is moved out of bones. The default is false.
     """

@@ -122,7 +122,7 @@ class Hill(Record):
 
 
 class HillSettings(Record):
-    """Settings of lines that are equally strong Hill-type muscles with tendons, in equilibrium at each frame (section 5.1).
+    """Settings of lines that are equally strong Hill-type muscles with tendons, in equilibrium at each frame (report 5.1).
 
     ``max_force``: the sum of the maximum isometric forces of all lines. ``fibre_share``: the optimal fibre length of a line divided
     by the length of the line at the first frame, where the tendon is just slack. ``pennation``: the angle between fibres and tendon
