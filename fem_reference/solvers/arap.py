@@ -46,8 +46,8 @@ class ArapSettings(Record):
     (only their columns are removed, and all rows are solved by least squares, eq. 5.12). With "remove", tutte weights give the same
     states as kirchhoff weights. ``rotations``: fitted before "each" global step, or once per frame ("first only"), in which case
     later iterations change nothing. ``volume_step``: after each global step, the free vertices are scaled by eq. 5.9 about the mean
-    of all vertices. ``iterations``: the number per frame, or the maximum if there is a ``tolerance``. ``tolerance`` [mm]: a frame
-    ends when no vertex moves farther than this in an iteration; if some frame needs more than ``iterations``, the run ends
+    of all vertices. ``iterations``: the number per frame, or the maximum if there is a ``tolerance``. ``tolerance`` [mm]:
+    iterations end when no vertex moves farther than this in one of them; if some frame needs more than ``iterations``, the run ends
     ``out of steps``.
     """
 
@@ -74,7 +74,7 @@ def laplacian(cells: VertexCells) -> Any:
 
 
 def least_energy(points: Floats, cells: VertexCells) -> float:
-    """The energy [mm2] of eq. 5.10, with squared norms, at ``points`` (n, 3), with the rotations that minimise it."""
+    """The least energy [mm2] of eq. 5.10, with squared norms, over all rotations of cells, at ``points`` (n, 3)."""
     return energy(points, fit_rotations(points, cells), cells)
 
 

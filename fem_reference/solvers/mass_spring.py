@@ -198,7 +198,7 @@ class MassSpringModel:
 def solve(problem: MuscleProblem, settings: MassSpringSettings, sink: Sink) -> Outcome:
     """Advance from rest at the first of ``problem.frames`` to the last; each requested frame goes to ``sink``.
 
-    The status is *out of steps* if a frame number needs too many time steps.
+    The status is *out of steps* if the motion to a frame number needs too many time steps.
     """
     quick = settings.model_copy(update={"time_step": settings.frame_time})
     model = timed(MassSpringModel, problem, settings, quick)

@@ -149,7 +149,7 @@ class Rods(MovingSurface):
         self.last = number
 
     def _moved(self, ends: Ints, number: int) -> tuple[Floats, Floats]:
-        """Points and rotations of the rods if each rod moved rigidly with one bone from the last frame number to ``number``.
+        """Points and rotations of the rods if each rod moved rigidly with one bone from the previous frame number to ``number``.
 
         ``ends`` (k,): the index of this bone for each rod.
         """
