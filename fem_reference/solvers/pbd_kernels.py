@@ -103,7 +103,7 @@ def dihedral(p1: Vector, p2: Vector, p3: Vector, p4: Vector) -> tuple[float, Vec
     """The dihedral angle [rad] between triangles (p1, p2, p3) and (p1, p2, p4), and its gradients at p1 to p4. Eq. 5.22-5.30.
 
     The angle is pi for a flat pair and does not depend on the side to which the pair is folded. Gradients are zero where arccos is
-    not differentiable: for pairs that are flat, folded shut or without area. Near these, arccos of the cosine d would lose half of its
+    not differentiable: for pairs that are flat, folded shut or without area. Near these, arccos of the cosine d loses half of its
     digits, so the angle is atan2(sine, d). In eq. 5.26, eq. 5.30 must be transposed, and ``n2 . (n2 x p2)`` is an outer product.
     """
     e, a, b = minus(p2, p1), minus(p3, p1), minus(p4, p1)
