@@ -150,7 +150,7 @@ class Results:
 
 
 def of_run(folder: Path | str, case: str | Path | Case) -> Results:
-    """The results of the run in ``folder``. ``case``: the name or folder of its case, or the case with the changes of that run.
+    """The results of the run in ``folder``. ``case``: the name or folder of its case, or the case as changed for that run.
     Raises InputError if there is no run with states, or if the run belongs to another case.
     """
     folder = Path(folder)

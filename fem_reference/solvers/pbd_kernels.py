@@ -1,4 +1,4 @@
-"""Compiled values, gradients and projections of the three constraints of position based dynamics. Report section 5.5.3.
+"""Compiled functions for the three constraints of position based dynamics: values, gradients, projections. Report 5.5.3.
 
 Functions whose name begins with ``project_`` move ``points`` (n, 3) [mm] in place, by eq. 5.14 of the report weighted with inverse
 masses w (n,): ``dp_i = -stiffness w_i grad_i C / (sum_j w_j |grad_j C|^2) C``. To first order, one projection removes the fraction
