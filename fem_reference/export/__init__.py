@@ -34,7 +34,7 @@ _NO_DIFFERENCE = "no springs at points of the surface, no bone that overlaps the
 def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: Format) -> list[str]:
     """Write the problem that ``build`` creates from a ``case`` into ``folder``, and return the names of the files.
 
-    The form ``"febio"`` adds FEBio's input file to the open formats, and logs a warning for each difference of FEBio's model. If
+    The form ``"febio"`` adds FEBio's input file to the open formats and logs the differences from the reference as warnings. If
     there are several muscles, each has a folder with its name, and there is one input file for all of them. Raises InputError
     unless the folder is missing or empty, or if FEBio lacks an effect of the case. After a failure no folder is left behind.
     """

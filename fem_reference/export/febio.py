@@ -2,7 +2,7 @@
 
 The format is documented in FEBio's feature manual (febiosoftware/febio-feature-manual) and in the sources of FEBio and FEBio Studio
 that read and write these files. FEBio 4.11 was run with exported files; FEBIO.md lists the identical parts of the models, and the
-measured differences. Time is the frame number minus the first frame number.
+differences in results. Time is the frame number minus the first frame number.
 """
 
 from collections.abc import Iterable
@@ -35,12 +35,12 @@ from fem_reference.scenes.muscle import MuscleCase
 SAME = (NeoHooke, MooneyRivlin, Incompressible, IncompressiblePenalty, FibrePassive, FibrePassiveFebio, Contact)
 LONGEST_STEP = 2.0  # the longest step [frame numbers], as in the runs that FEBIO.md compares
 # Newton's method stops if the correction is less than dtol times the displacement increment of the step so far, and its energy is
-# less than etol times the energy of the first iteration of the step. With dtol = 1e-3 the residual force would be 0.4 %.
+# less than etol times the energy of the first iteration of the step. With dtol = 1e-3 the residual would be 0.4 % of the forces.
 TOLERANCES = {"dtol": 1e-4, "etol": 1e-5}
 
 
 def check(case: MuscleCase) -> None:
-    """Raise InputError if FEBio lacks an effect of the case in the same form, or has no material for its effects together."""
+    """Raise InputError if FEBio lacks an effect of the case in the same form, or has no material for their combination."""
     for i, effect in enumerate(case.effects):
         if not isinstance(effect, SAME):
             want = f"an effect that FEBio has in the same form: {', '.join(name_of(kind) for kind in SAME)}"
@@ -105,7 +105,7 @@ def model(problem: MuscleProblem) -> Element:
 
 
 def _control(root: Element, problem: MuscleProblem) -> None:
-    """Add the section ``Control``: steps are at most ``LONGEST_STEP`` long, end at each frame, and are shorter if necessary."""
+    """Add the section ``Control``: steps of at most ``LONGEST_STEP``, shorter if necessary, with a step that ends at each frame."""
     control, step = SubElement(root, "Control"), _step(problem)
     steps = round((problem.frames[-1] - problem.frames[0]) / step)
     settings = {"analysis": "STATIC", "time_steps": steps, "step_size": step}
@@ -194,7 +194,7 @@ def _curve(data: Element, number: int, kind: str, points: list[tuple[float, floa
 
 
 def _output(root: Element) -> None:
-    """Add the section ``Output``: displacement and stress for FEBio Studio, and the nodes of the muscle as text."""
+    """Add the section ``Output``: displacement and stress for FEBio Studio, and the positions of the muscle's nodes as text."""
     output = SubElement(root, "Output")
     plot = SubElement(output, "plotfile", type="febio")
     SubElement(plot, "var", type="displacement")

@@ -2,9 +2,9 @@
 
 FEBio's ``tied-elastic`` contact applies a traction: the penalty times the change, since rest, of the vector from a point on the
 primary surface to the point on the secondary surface that was nearest at rest. FEBio integrates it over the current primary
-surface, which here is a rigid copy of the attached area, whose area does not change. Therefore the contact acts like the springs of
-an attachment, with a stiffness per unit rest area that is the same in all directions. Springs at points of the surface are
-represented by small rigid triangles at the nearest points of the tetrahedra.
+surface, which here is a rigid copy of the attached area and keeps its size. Therefore the contact acts like the springs of an
+attachment, with a stiffness per unit rest area that is the same in all directions. Springs at points of the surface are represented
+by small rigid triangles at the nearest points of the tetrahedra.
 """
 
 from collections.abc import Iterator
@@ -23,13 +23,13 @@ from fem_reference.problems.setup import AttachedVertices
 
 SEARCH_RADIUS = 5.0  # the maximum depth inside a bone at which FEBio searches for contact [mm]
 # The maximum initial pressure due to overlap at rest, in shear moduli of the matrix. In gluteus_maximus_anatomical the pressure is
-# up to 34 with a search radius of 5 mm, and FEBio did not complete its first step; with 0.1 mm it is up to 10, and FEBio did.
+# up to 34 with a search radius of 5 mm, and FEBio failed in its first step; with 0.1 mm it is up to 10, and FEBio succeeded.
 _AT_ONCE = 10.0
 SPRING_SEARCH_RADIUS = 1.0  # the search radius for springs [mm], whose two surfaces coincide at rest
 # Contact by penalty without augmentation, in one pass, with the given penalty and the complete tangent.
 PENALTY = {"laugon": 0, "two_pass": 0, "auto_penalty": 0, "symmetric_stiffness": 0}
-# Only springs over facets have been run in FEBio 4.11: the force on the femur differs by 5.3 % in gluteus_medius and by 8.8 % in
-# gluteus_maximus.
+# Only springs over facets have been run in FEBio 4.11: the force on the femur differs from the reference by 5.3 % in gluteus_medius
+# and by 8.8 % in gluteus_maximus.
 MEASURED = (
     "Springs at points have not been run in FEBio 4.11. In the reference, springs at the nearest points change the force on the "
     "femur by 0.4 % and positions by 0.01 mm (rms; gluteus_medius, frame 20), with 12 mm tetrahedra by 1.2 % and 0.04 mm; springs "
@@ -97,7 +97,7 @@ def search_radius(problem: MuscleProblem, deep: float) -> float:
 
 
 def notes(problem: MuscleProblem) -> list[str]:
-    """Sentences, with values, about the differences of FEBio's model: regions, springs at points, bones that overlap at rest."""
+    """Sentences, with values, about differences from FEBio's model: regions, springs at points, bones that overlap at rest."""
     # Springs that act over facets in the reference act in the same way in FEBio.
     on_skins = [one for one in febio_mesh.by_springs(problem) if one.attachment in problem.attached_skins]
     springs = [*(_springs(problem, one) for one in on_skins), *([MEASURED] if on_skins else [])]

@@ -22,12 +22,12 @@ from fem_reference.geometry.distance import distances
 from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices, Bone
 
-# The pairs of corners between which the mid-side nodes of a tet10 are; the first three pairs are also those of a tri6.
+# The pairs of corners between which the mid-side nodes of a tet10 lie; the first three pairs are also those of a tri6.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 FACING = [0, 2, 1, 5, 4, 3]  # the order of the nodes of a tri6 that reverses its normal
-# Springs at points are small rigid triangles. SHRUNK is their area divided by that of the point; the penalty is divided by it too.
+# Springs at points are small rigid triangles. SHRUNK: their area divided by the point's tributary area; it divides the penalty too.
 SHRUNK = 0.01
-_LEAST_AREA = 1e-6  # a point has no spring if its area is less than this fraction of the largest area
+_LEAST_AREA = 1e-6  # a point has no spring if its tributary area is less than this fraction of the largest
 _CLEAR = 0.005  # the barycentric distance of these triangles from the edges of a facet, so that no ray misses the facet
 
 
@@ -125,7 +125,7 @@ def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringP
     """The points of the tetrahedra at which the springs of an attachment act, for springs at points of the surface.
 
     FEBio's ``tied-elastic`` subtracts the gap at rest. Therefore a triangle in the plane of a facet acts as a spring at a point, if
-    its area is the fraction ``SHRUNK`` of the area of the point.
+    its area is the fraction ``SHRUNK`` of the tributary area of the point.
     """
     skin, outer = problem.attached_skins[attached.attachment], boundary(problem.mesh.tets)[0]
     of = np.flatnonzero(skin.areas > _LEAST_AREA * skin.areas.max(initial=0.0))

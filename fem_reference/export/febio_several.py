@@ -9,7 +9,7 @@ from fem_reference.problems.muscles import MusclesProblem
 # The attributes that contain names, and the tags whose text is a name.
 _ATTRIBUTES = ("name", "mat", "node_set", "elem_set", "surface_pair")
 _TEXTS = ("primary", "secondary", "rb")
-# The entries that are numbered over all muscles, with the kind of number, and the entries whose text consists of node numbers.
+# The entries that are numbered across all muscles, with the kind of number, and the entries whose text consists of node numbers.
 _NUMBERED = {"node": "node", "elem": "elem", "material": "material", "load_controller": "curve"}
 _OF_NODES = ("elem", "tri3", "tri6", "NodeSet")
 _ONCE = ("Module", "Control")  # sections that are the same for all muscles
@@ -85,7 +85,7 @@ def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
     """Add contact between each pair of muscles that may touch, in two passes with half of the stiffness, as in the reference."""
     if not problem.pairs:
         return
-    assert problem.law is not None  # as muscles touch only by a law
+    assert problem.law is not None  # there are pairs only with a law of contact
     for k, (one, other) in enumerate(problem.pairs):
         name = f"touching_{k}_{one}_{other}"
         febio_mesh.Mesh.pair(sections["Mesh"], f"{name}_pair", f"{one}_touching", f"{other}_touching")
@@ -98,7 +98,7 @@ def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
 
 
 def notes(problem: MusclesProblem) -> list[str]:
-    """Sentences about the differences of FEBio's model, for each muscle and for contact between muscles."""
+    """Sentences about differences between FEBio's model and the reference, for each muscle and for contact between muscles."""
     own = [f"{name}: {text}" for name, one in problem.problems.items() for text in febio_contact.notes(one)]
     between = list[str]()
     for one, other in problem.pairs:

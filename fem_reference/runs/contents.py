@@ -89,12 +89,12 @@ def amend(folder: Path, **changes: Any) -> None:
 
 
 def vector_scalars(name: str, vector: Floats) -> dict[str, float]:
-    """The components of a ``vector`` (3,) as scalars of a frame, with ``name`` and the axis as names."""
+    """The components of a ``vector`` (3,) as scalars of a frame, whose names consist of ``name`` and the axis."""
     return {f"{name}_{axis}": float(value) for axis, value in zip("xyz", vector, strict=True)}
 
 
 def vector_names(scalars: Mapping[str, Floats], kind: str) -> list[str]:
-    """The names of all vectors of a ``kind``, such as the bones of forces, whose components are in ``scalars``.
+    """The names of all vectors of a ``kind`` whose components are in ``scalars``; for forces, the names of the bones.
 
     >>> vector_names(dict.fromkeys(vector_scalars("force_on_femur", np.zeros(3))), "force_on_")
     ['femur']

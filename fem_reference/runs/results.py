@@ -48,7 +48,7 @@ ROUNDING = 1e-9
 class Results:
     """The ``states`` of a muscle, by frame number, with its ``mesh`` and ``effects``. ``regions``: the regions in which effects
     act, by name. ``fibre`` (m, 3): the unit vectors along the fibres at the centroids of the tetrahedra, if known. The solver uses
-    directions at quadrature points; in a bar with tetrahedra of 6 mm these differ by 2 degrees (rms).
+    directions at quadrature points, which differ from these by 2 degrees (rms) in a bar with tetrahedra of 6 mm.
     """
 
     mesh: TetMesh
@@ -150,7 +150,7 @@ class Results:
 
 
 def of_run(folder: Path | str, case: str | Path | Case) -> Results:
-    """The results of the run in ``folder``. ``case``: the name or folder of its case, or the case with the changes of that run.
+    """The results of the run in ``folder``. ``case``: the name or folder of its case, or the case as changed for that run.
     Raises InputError if there is no run with states, or if the run belongs to another case.
     """
     folder = Path(folder)

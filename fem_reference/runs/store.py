@@ -35,7 +35,7 @@ from fem_reference.scenes.case import Part
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """The results at a requested frame with a ``number``. Parts that the solver does not have are None or empty.
+    """The results at the requested frame ``number``. Parts that the solver does not have are None or empty.
 
     ``surface`` (n, 3), ``fibres`` (m, 3), ``points`` (k, 3) [mm]: positions of the vertices of the surface, of the points of the
     fibres and of the nodes of the mesh. ``forces`` (3,) [N]: the force of each constraint, along its prescribed components, and of
@@ -44,10 +44,10 @@ class Frame:
     field of a scalar problem. ``residuals``: the norms [N, mm3] before and after each Newton iteration of the last load step.
     ``note``: a text that is shown with the progress of the run.
 
-    ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, stored energy [N mm], newton_iterations,
+    ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, energy (stored) [N mm], newton_iterations,
     cut_backs. The reference adds the extremes of means over cells, min_cell_volume_ratio and max_cell_volume_ratio and, if a law
     limits the fibre stretch, min_cell_fibre_stretch and max_cell_fibre_stretch; outside_law, the number of cells outside the range
-    of a law; if all energy is stored, energy_gap, the gap since the last frame (``solvers/fenicsx/path``; for muscles by Simpson's
+    of a law; if all energy is stored, energy_gap, the growth not due to work (``solvers/fenicsx/path``; for muscles by Simpson's
     rule if the trapezoidal rule is poor); if the tangent is symmetric, the number of negative_modes and of material_modes among
     them (``solvers/fenicsx/stability``); with contact, the maximum contact_depth [mm] and contact_pressure [MPa], and the
     contact_area at rest [mm2]; for a muscle, the stresses of ``stress_statistics``, such as stress_von_mises_p95 [MPa].
@@ -283,7 +283,7 @@ def complete(run: Run, numbers: tuple[int, ...], *, trusted: bool = True) -> Run
 
 def seconds_per_frame(run: Run) -> float | None:
     """The mean time [s] to solve a frame after the first; None if the run was computed elsewhere and no time is given. The time is
-    ``seconds_solve``, which excludes compilation and output, or without this entry the wall-clock time of the run.
+    ``seconds_solve``, which excludes compilation and output, or, without this entry, the wall-clock time of the run.
     """
     cost = run.outcome.cost
     seconds = cost.get("seconds_solve", cost.get("seconds"))

@@ -26,7 +26,7 @@ from fem_reference.runs.contents import FORMAT, Contents, RunJson, frame_file
 from fem_reference.runs.store import Frame, Outcome
 
 RESTART = "restart"
-# The statuses of a run that was killed, for example when memory or disk was full: "running" if its writer was killed too.
+# The statuses of a run that was killed, as when memory or disk is full: "crashed", or "running" if its writer was killed too.
 ENDED_EARLY = ("running", "crashed")
 
 

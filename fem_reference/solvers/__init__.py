@@ -65,9 +65,9 @@ def in_table(kind: str | None = None) -> tuple[Candidate, ...]:
 
 
 def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
-    """The name of a run, and the solver with its settings, that belong to ``name``, the name of a candidate or of a solver.
+    """The name of the run, and the solver with its settings, for ``name``, which is the name of a candidate or of a solver.
 
-    The settings are from the candidates of the case; otherwise, for a muscle, from table-5-1; otherwise they are the defaults.
+    The settings are those of a candidate of the case; without one, for a muscle, those in table-5-1; otherwise the defaults.
     """
     own = [one for one in case.candidate if one.solver == name] + [one for one in case.candidate if one.name == name]
     table = [one for one in in_table() if one.solver == name and case.task == "solve"]

@@ -3,9 +3,9 @@
 The edges around each vertex form a cell, which is rotated with as little distortion as possible. Frame number n is the state in
 which the bones have their pose of frame n; attached vertices move exactly with their bone. Starting from the previous state, the
 method alternates between the rotations of all cells (local step) and the positions of the free vertices (global step). If the rows
-of attached vertices are removed and an edge has the same weight at both ends, each step minimises eq. 5.10 over its unknowns, so
-the energy never rises. This also holds with negative weights, because the matrix is still the positive stiffness matrix of linear
-elements. Attachments by springs are treated as exact, and there is no contact.
+of attached vertices are removed and each edge has the same weight at both ends, each step minimises eq. 5.10 over its unknowns, so
+the energy never rises. This also holds with negative weights, because the matrix is still the positive definite stiffness matrix of
+linear elements. Attachments by springs are treated as exact, and there is no contact.
 """
 
 from collections.abc import Callable
@@ -42,12 +42,12 @@ class ArapSettings(Record):
     ``weights``: the weights of edges, "cotangent" (eq. 5.13), "clamped cotangent" (negative weights set to 0), "kirchhoff" (all 1)
     or "tutte" (kirchhoff, with each row divided by its diagonal). A cotangent weight is negative if the two angles opposite the
     edge sum to more than pi. With negative weights, as in libigl, rotating a cell by 180 degrees may lower the energy, so the rest
-    state is unstable. ``fixed``: the treatment of attached vertices, "remove" (their rows and columns are removed) or "ols" (only
-    their columns are removed, and all rows are solved by least squares, eq. 5.12). With "remove", tutte weights give the same
+    state may be unstable. ``fixed``: the treatment of attached vertices, "remove" (their rows and columns are removed) or "ols"
+    (only their columns are removed, and all rows are solved by least squares, eq. 5.12). With "remove", tutte weights give the same
     states as kirchhoff weights. ``rotations``: fitted before "each" global step, or once per frame ("first only"), in which case
-    later iterations change nothing. ``volume_step``: after each global step, the free vertices are scaled by eq. 5.9 about the
-    mean of all vertices. ``iterations``: the number per frame, or the maximum if there is a ``tolerance``. ``tolerance`` [mm]: a
-    frame ends when no vertex moves farther than this in an iteration; if some frame needs more than ``iterations``, the run ends
+    later iterations change nothing. ``volume_step``: after each global step, the free vertices are scaled by eq. 5.9 about the mean
+    of all vertices. ``iterations``: the number per frame, or the maximum if there is a ``tolerance``. ``tolerance`` [mm]:
+    iterations end when no vertex moves farther than this in one of them; if some frame needs more than ``iterations``, the run ends
     ``out of steps``.
     """
 
@@ -74,7 +74,7 @@ def laplacian(cells: VertexCells) -> Any:
 
 
 def least_energy(points: Floats, cells: VertexCells) -> float:
-    """The energy [mm2] of eq. 5.10, with squared norms, at ``points`` (n, 3) and the rotations that minimise it."""
+    """The least energy [mm2] of eq. 5.10, with squared norms, over all rotations of cells, at ``points`` (n, 3)."""
     return energy(points, fit_rotations(points, cells), cells)
 
 
@@ -82,10 +82,10 @@ def least_energy(points: Floats, cells: VertexCells) -> float:
 class GlobalStep:
     """The global step for given ``attached`` (k,) and ``free`` vertices (m,), with a matrix that is factorised once.
 
-    ``pick`` (m, n): the matrix by which both sides are multiplied. It selects the rows of free vertices or, for least squares, is
-    the transpose of their columns. ``coupling`` (m, k): ``pick`` times the columns of attached vertices. ``loose``: free vertices
-    that are not connected to an attached vertex by nonzero weights. ``factor``: the LU factors, or None if there are loose
-    vertices, no attached vertices or no free vertices; no vertex moves then.
+    ``pick`` (m, n): the matrix by which both sides of the equations are multiplied. It selects the rows of free vertices or, for
+    least squares, is the transpose of their columns. ``coupling`` (m, k): ``pick`` times the columns of attached vertices.
+    ``loose``: free vertices that are not connected to an attached vertex by nonzero weights. ``factor``: the LU factors, or None if
+    there are loose vertices, no attached vertices or no free vertices; no vertex moves then.
     """
 
     cells: VertexCells

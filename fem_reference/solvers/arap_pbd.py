@@ -1,10 +1,10 @@
 """ARAP (as rigid as possible) combined with position based dynamics in the two ways that report sections 6.2 and 7.2 propose.
 
-*Volume constraint*: the ARAP energy is minimised at constant volume, instead of scaling the surface after each step. The positions
-of a global step solve ``L p' = b + lambda grad V``, with the gradient of the volume at the previous iteration and a multiplier
-lambda for which the enclosed volume is the volume at rest. At convergence, the gradient of the energy is a multiple of the gradient
-of the volume. *Initial guess*: sweeps of PBD's projections (edge lengths, volume, dihedral angles) start from the ARAP state of the
-frame, without velocities. If both are requested, the projections come last. As in ``arap``, there is no contact.
+*Volume constraint*: the ARAP energy is minimised at constant volume; the surface is not scaled after each step. The positions of a
+global step solve ``L p' = b + lambda grad V``, with the gradient of the volume at the previous iteration and a multiplier lambda
+for which the enclosed volume is the volume at rest. At convergence, the gradient of the energy is a multiple of the gradient of the
+volume. *Initial guess*: sweeps of PBD's projections (edge lengths, volume, dihedral angles) start from the ARAP state of the frame,
+without velocities. If both are requested, the projections come last. As in ``arap``, there is no contact.
 """
 
 from typing import Annotated
@@ -87,8 +87,8 @@ def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest
     """Alternate local and global steps, starting from ``points`` (n, 3) [mm].
 
     With ``volume_constraint``, each iteration ends at the volume of ``rest``. The status is *diverged* if this constraint moves a
-    point farther from the unconstrained minimum than the edge length of a cube of that volume: the volume is then preserved only by
-    folds of the surface, at a wrong root of the cubic.
+    point away from the unconstrained minimum by more than the edge length of a cube of that volume: the volume is then preserved
+    only by folds of the surface, at a wrong root of the cubic in :func:`at_volume`.
     """
     count, met, tolerance = 0, False, settings.tolerance
     while count < settings.iterations and not met:

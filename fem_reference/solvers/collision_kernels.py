@@ -1,10 +1,10 @@
 """Contact of vertices with bones, as constraints ``C = distance - allowed >= 0``. Report section 6.1.1.
 
-The distance to a bone is computed only for vertices that may be near the bone: a vertex whose displacement relative to the bone,
-since the last check, is less than its distance at that check is still outside. Only vertices are checked, and only at their new
-positions. Therefore a sharp edge of a bone may pass between vertices, and a vertex that crosses a thin bone in one step ends on the
-other side. The distance to a bone made of triangles is stored on a grid aligned with the axes at rest, so results depend on the
-axes: if the entire scene is rotated, vertices in the case hip_flexion with ``pbd`` differ by up to 1.2 mm (mean 0.1 mm).
+The distance to a bone is computed only for vertices that may be near the bone: a vertex that has moved relative to the bone by less
+than its distance at the last check is still outside. Only vertices are checked, and only at their new positions. Therefore a sharp
+edge of a bone may pass between vertices, and a vertex that crosses a thin bone in one step ends on the other side. The distance to
+a bone made of triangles is stored on a grid aligned with the axes at rest, so results depend on the axes: if the entire scene of
+hip_flexion is rotated, positions of vertices with ``pbd`` differ by up to 1.2 mm (mean 0.1 mm).
 """
 
 import math
@@ -79,7 +79,7 @@ def _spline(coefficients: Floats, x: float, y: float, z: float) -> tuple[float, 
 
 @compiled
 def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats) -> tuple[Floats, Floats]:
-    """The distance (n,) [mm] and its gradient (n, 3) at ``points`` (n, 3) [mm], interpolated by a ``Grid`` with these arguments."""
+    """The distance (n,) [mm] and its gradient (n, 3) at ``points`` (n, 3) [mm], by interpolation on a ``Grid``."""
     distance, gradient = np.full(len(points), FAR), np.zeros_like(points)
     last_x, last_y, last_z = coefficients.shape[0] - 2, coefficients.shape[1] - 2, coefficients.shape[2] - 2
     for n in range(len(points)):
@@ -170,7 +170,7 @@ def colliding_bones(bones: Sequence[Bone], rest: Floats, attached: Ints, gap: fl
 
 
 def move_out(points: Floats, bones: Sequence[CollidingBone], stiffness: float) -> None:
-    """Move ``points`` (n, 3) [mm] in place out of all bones.
+    """Move ``points`` (n, 3) [mm] out of all bones, in place.
 
     A point that several bones contain moves by the sum of the displacements out of each. ``stiffness``: the fraction of each
     displacement that is applied. Masses cancel, because each constraint has a single vertex.

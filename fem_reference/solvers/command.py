@@ -162,8 +162,8 @@ def of_function(function: Callable[..., None], given: Mapping[str, Any], folder:
 
 
 def placeholders(command: str, place: str) -> tuple[str, ...]:
-    """The names of the settings in a ``command``. Raises InputError if the command cannot be split into words, lacks a folder, has
-    braces without a name, or has a setting with a reserved name.
+    """The names of the settings in a ``command``. Raises InputError if the command cannot be split into words, lacks a folder
+    (``{scene}`` or ``{out}``), has braces without a name, or has a setting with a reserved name.
     """
     where = join(place, "command")
     try:
@@ -284,7 +284,7 @@ def _read(problem: MuscleProblem, settings: CommandSettings, ended: programs.End
 
 def _stated(said: recorded.About, problem: MuscleProblem, ended: programs.Ended) -> dict[str, float]:
     """The entries of the cost that the program states: its threads, and the time in which it solved the frames. Raises InputError
-    if this time is longer than the program ran.
+    if this time exceeds the duration of the program.
     """
     found = {} if said.threads is None else {"threads": float(said.threads)}
     if said.seconds_per_frame is None:

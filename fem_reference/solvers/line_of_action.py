@@ -142,7 +142,7 @@ def _lengths(passed: Passed, paths: Paths | Winding) -> Floats:
 def _on_bones(
     bones: tuple[Bone, ...], wraps: Wraps, passed: Passed, paths: Paths | Winding, tensions: Floats
 ) -> dict[str, float]:
-    """The components of the force [N] and of the moment about the origin [N mm] on each bone, by the names of scalars.
+    """The components of the force [N] and of the moment about the origin [N mm] on each bone, by the name of the scalar.
 
     ``tensions`` (k,) [N]: the forces of the lines. Each part of a line pulls at both of its ends, along the path. An obstacle
     receives the pull of the line on both sides of the contact, because a line without weight is in equilibrium there.

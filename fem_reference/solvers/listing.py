@@ -26,7 +26,7 @@ SQUARE, LINEAR, CONSTANT = 26.0, 2.0, 0.05
 
 
 class ListingSettings(Record):
-    """Settings of the listings.
+    """Settings of the report's listings.
 
     ``peclet``: the Peclet number, which is the argument of listing 4.1, by default 1 as in its header. Listing 4.5 has no argument.
     """
@@ -38,7 +38,7 @@ def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outco
     """Run the listing for the domain of the problem: 4.1 for an interval, 4.5 for triangles.
 
     The mesh is that of the problem, and so are the fixed values of listing 4.5; the listing defines the equation and the slopes.
-    Listing 4.5 plots the negative norm of its vector unknown. This plotted value is the field, and ``components`` is the vector.
+    Listing 4.5 plots minus the norm of its vector unknown. This plotted value is the field, and ``components`` is the vector.
     """
     begin = time.perf_counter()
     mesh = problem.mesh
@@ -61,7 +61,7 @@ def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outco
 def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
     """Raise InputError, with a key inside ``place``, if the listing does not have the boundary conditions or settings requested.
 
-    Listing 4.1 has the value 0 at the first node and the slope -1 at the last. Listing 4.5 has only values, and no Peclet number.
+    Listing 4.1 has value 0 at the first node and slope -1 at the last. Listing 4.5 has fixed values, no slope, no Peclet number.
     """
     points, fixed = problem.mesh.points, problem.fixed[: len(problem.mesh.points)]
     if problem.mesh.cells.shape[1] == 2:

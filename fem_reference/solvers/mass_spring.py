@@ -1,9 +1,9 @@
 """A mass-spring system. Report section 5.5.1, eqs 5.3 to 5.7.
 
-This is a volumetric model, as in Table 5.1: the points of the tetrahedral mesh are masses, and its edges are springs. (In Janak's
-model the masses are points sampled on fibres and connected to nearby masses.) The displacement of the surface and of the fibres is
-interpolated from the masses. Springs resist neither a change of volume nor the inversion of a tetrahedron. Attachments are exact;
-their stiffness is ignored. Contact acts only on masses at the surface, so the surface between them may penetrate a bone.
+This is a volumetric model, as in Table 5.1: the points of the tetrahedral mesh are masses, and its edges are springs. (In another
+model, by Janak, the masses are points sampled on fibres and connected to nearby masses.) The displacement of the surface and of the
+fibres is interpolated from the masses. Springs resist neither a change of volume nor the inversion of a tetrahedron. Attachments
+are exact; their stiffness is ignored. Contact acts only on masses at the surface, so the surface between them may penetrate a bone.
 """
 
 import math
@@ -29,7 +29,7 @@ from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advanc
 
 # The default time step divided by the largest stable time step.
 SHARE_OF_STABLE = 0.9
-# The maximum number of time steps per frame number; these take more than two seconds with 3,000 tetrahedra.
+# The maximum number of time steps per frame number; this many take more than two seconds with 3,000 tetrahedra.
 _MOST_STEPS = 100_000
 # The number of time steps in one call of compiled code. A user can interrupt a run only between two calls.
 _AT_ONCE = 200
@@ -49,12 +49,12 @@ def _damping(text: object) -> float | str:
 class MassSpringSettings(Record):
     """Stiffness, density, loads and time steps of the mass-spring system.
 
-    ``stiffness``: the stiffness of each spring. ``density``: the density of the muscle, whose mass is divided equally among the
-    masses: equilibrium without gravity does not depend on them, and a single small mass would make every time step small.
+    ``stiffness``: the stiffness of each spring. ``density``: the density of the muscle, which is divided into equal masses: a
+    single small mass would make every time step small, and equilibrium without gravity does not depend on the masses.
     ``frame_time``: the time between two frame numbers in this solver, which replaces the interval of the scene; the longer it is,
-    the closer the muscle comes to equilibrium. ``damping``: the coefficient c, or ``"eq. 5.5"`` for the value of
-    ``report_damping``; by default there is no damping. ``gravity``: an acceleration, by default none. ``collision``: contact with
-    bones after every time step, by default none. ``time_step``: the maximum time step, by default 0.9 of the stable time step.
+    the closer the muscle comes to equilibrium. ``damping``: the damping coefficient, or ``"eq. 5.5"`` for its value by eq. 5.5 of
+    the report; by default there is no damping. ``gravity``: an acceleration, by default none. ``collision``: contact with bones
+    after every time step, by default none. ``time_step``: the maximum time step, by default 0.9 of the stable time step.
     """
 
     stiffness: Stiffness
@@ -86,7 +86,7 @@ def report_damping(mass: float, stiffness: float) -> float:
     """The damping coefficient c = 2 sqrt(2 m (2 + 4 / k_a)) [N s/mm] of eq. 5.5, for a ``mass`` m [tonne] and a ``stiffness`` k_a
     [N/mm].
 
-    The equation adds a constant to the reciprocal of a stiffness, so it holds in a single system of units, which the report does
+    The equation adds a constant to the reciprocal of a stiffness, so it holds in only one system of units, which the report does
     not state. In SI units (kg, N/m, N s/m), which are used here, c is the critical damping 2 sqrt(m k) of a mass on a spring of
     stiffness k = 4 + 8 / k_a. This k equals k_a for k_a = 2 + sqrt(12) = 5.46 N/m, and approaches 4 N/m for large k_a.
     """
@@ -198,7 +198,7 @@ class MassSpringModel:
 def solve(problem: MuscleProblem, settings: MassSpringSettings, sink: Sink) -> Outcome:
     """Advance from rest at the first of ``problem.frames`` to the last; each requested frame goes to ``sink``.
 
-    The status is *out of steps* if a frame number needs too many time steps.
+    The status is *out of steps* if the motion to a frame number needs too many time steps.
     """
     quick = settings.model_copy(update={"time_step": settings.frame_time})
     model = timed(MassSpringModel, problem, settings, quick)

@@ -33,7 +33,7 @@ class PbdCollision(Record):
     """Contact of bones with free vertices.
 
     ``gap`` [mm]: the minimum distance between a vertex and a bone; for a vertex that is closer at rest, the minimum is its distance
-    at rest. ``stiffness``: the fraction of the displacement out of a bone that one projection applies.
+    at rest. ``stiffness``: the fraction of the missing distance that one projection restores.
     """
 
     gap: Annotated[Length, Field(ge=0)]
@@ -41,7 +41,7 @@ class PbdCollision(Record):
 
 
 class PbdSettings(Record):
-    """Settings of the algorithm; every key is required except ``anisotropy`` and ``collision``.
+    """Settings of the report's Algorithm 1, with its line numbers; every key is required except ``anisotropy`` and ``collision``.
 
     ``sub_iterations``: the number of steps of the algorithm in each iteration, 3 in section 6.1 of the report.
     ``solver_iterations``: the number of sweeps over all constraints in each step (line 15). ``damping``: the fraction of each
@@ -116,7 +116,7 @@ def hinges_of(triangles: Ints) -> Ints:
 def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
     """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre segment nearest to the midpoint of the edge.
 
-    If several segments are equally near up to rounding, as at a kink, the first is used, also in a rotated scene.
+    If several segments are equally near up to rounding, as at a kink, the first is used, even in a rotated scene.
     """
     starts = np.setdiff1d(np.arange(len(fibres.points) - 1), fibres.offsets[1:] - 1)
     starts = starts[np.any(fibres.points[starts + 1] != fibres.points[starts], axis=1)]

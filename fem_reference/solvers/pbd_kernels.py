@@ -1,4 +1,4 @@
-"""Compiled values, gradients and projections of the three constraints of position based dynamics. Report section 5.5.3.
+"""Compiled functions for the three constraints of position based dynamics: values, gradients, projections. Report 5.5.3.
 
 Functions whose name begins with ``project_`` move ``points`` (n, 3) [mm] in place, by eq. 5.14 of the report weighted with inverse
 masses w (n,): ``dp_i = -stiffness w_i grad_i C / (sum_j w_j |grad_j C|^2) C``. To first order, one projection removes the fraction
@@ -8,8 +8,8 @@ on this order. Arrays should be writable and C-contiguous; for any other layout 
 Functions whose name begins with ``pull_`` belong to extended position based dynamics (Macklin, Mueller and Chentanez 2016, DOI
 10.1145/2994258.2994272), in which a constraint C with the compliance alpha has the energy ``C^2 / (2 alpha)``. A projection moves
 points by ``dp_i = w_i grad_i C dl`` with ``dl = -(C + a l) / (sum_j w_j |grad_j C|^2 + a)`` and ``a = alpha / dt^2`` (eq. 18 of the
-paper); w is in 1/t (t: tonne). It adds dl to the multiplier l, which is 0 at the start of each time step; ``l / dt^2`` is the force
-of the constraint. Only the path to the solution depends on the order of the constraints.
+paper); w is in 1/t (t: tonne). It also adds dl to the multiplier l, which is 0 at the start of each time step; ``l / dt^2`` is the
+force of the constraint. Only the path to the solution depends on the order of the constraints.
 """
 
 import math
@@ -103,8 +103,8 @@ def dihedral(p1: Vector, p2: Vector, p3: Vector, p4: Vector) -> tuple[float, Vec
     """The dihedral angle [rad] between triangles (p1, p2, p3) and (p1, p2, p4), and its gradients at p1 to p4. Eq. 5.22-5.30.
 
     The angle is pi for a flat pair and does not depend on the side to which the pair is folded. Gradients are zero where arccos is
-    not differentiable: for pairs that are flat, folded shut or without area. Near these, arccos d would lose half of its digits, so
-    the angle is computed as atan2(sine, d). In eq. 5.26, eq. 5.30 must be transposed, and ``n2 . (n2 x p2)`` is an outer product.
+    not differentiable: for pairs that are flat, folded shut or without area. Near these, arccos of the cosine d loses half of its
+    digits, so the angle is atan2(sine, d). In eq. 5.26, eq. 5.30 must be transposed, and ``n2 . (n2 x p2)`` is an outer product.
     """
     e, a, b = minus(p2, p1), minus(p3, p1), minus(p4, p1)
     u1, u2 = cross(e, a), cross(e, b)

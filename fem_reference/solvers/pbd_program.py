@@ -17,16 +17,16 @@ The program (github.com/cervenkam/muscle-deformation-PBD) differs from the repor
   flood fill from one corner does not reach are inside. A vertex that was inside before the step moves by the last motion of the
   bone, in every step, even after the bone has stopped; a vertex that enters is moved back in steps of one voxel; if two bones move
   a vertex, the later bone takes precedence. Voxels are aligned with the axes at rest, and a single voxel can decide where a vertex
-  goes: if the scene is rotated, vertices of the case hip_flexion differ by up to 57 mm (mean 4.5 mm; without voxels 1e-8 mm)
+  goes: if the scene of hip_flexion is rotated, positions of vertices differ by up to 57 mm (mean 4.5 mm; without voxels 1e-8 mm)
 
 Frame number n is the state after iteration n.
 
 The recorded squeezed box is reproduced in all 300 iterations, to the last digit in single precision. This requires the program's
-order of arithmetic operations, so the projections of ``pbd`` cannot be used here. The squeezed box is chaotic: a difference of
-1e-15, at rest or from the order of a sum, grows to 3 mm at iteration 100. The recorded program was compiled by gcc with the
-program's flags, among them -Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result differs by
-iteration 50). For the same reason the pose of a bone is the product of its motions, and the rest angle of flat pairs has an error
-of 2e-8 rad.
+order of arithmetic operations, so the projections of ``pbd`` cannot be used here. The squeezed box is chaotic: a relative
+difference of 1e-15, at rest or from the order of a sum, grows to 3 mm at iteration 100. The recorded program was compiled by gcc
+with the program's flags, among them -Ofast (gcc 12 on x86-64 reproduces it; with -O0, -O2, -O3, -march=native or -mfma the result
+differs after at most 50 iterations). For the same reason the pose of a bone is the product of its motions, and the rest angle of
+flat pairs has an error of 2e-8 rad.
 
 This solver differs from the program in two respects. The scene defines the attached vertices, whereas the program attaches all
 vertices in the voxels of a bone at rest. The direction of a fibre follows its points, whereas the program mixes points of several
@@ -59,7 +59,7 @@ DIGITS = 12
 
 
 class ProgramSettings(Record):
-    """Settings of the program; every key is required except ``voxels`` and ``anisotropy``.
+    """Settings of the report's program; every key is required except ``voxels`` and ``anisotropy``.
 
     ``sub_iterations``: the number of steps in each iteration, 3 in section 6.1 of the report. ``damping``: the fraction of each
     velocity that is lost in a step, 0.01 in the program. ``bending``: a factor on the correction of dihedral angles, 0.9 in the
@@ -146,8 +146,8 @@ def half_edges_of(triangles: Ints) -> Ints:
 def hinges_of(points: Floats, triangles: Ints) -> tuple[Ints, Floats]:
     """The hinges (e, 4) of a closed surface and their dihedral angles (e,) [rad].
 
-    There is one hinge for each edge, in the order of the later of its two triangles. A hinge lists both ends of the edge, the
-    opposite vertex in the earlier triangle, and the opposite vertex in the later triangle.
+    There is one hinge for each edge; hinges are in the order of the later of their two triangles. A hinge lists both ends of the
+    edge, the opposite vertex in the earlier triangle, and the opposite vertex in the later triangle.
     """
     opposite, starts, ends = (np.roll(triangles, -corner, axis=1).ravel() for corner in range(3))
     sides = np.lexsort((np.maximum(starts, ends), np.minimum(starts, ends))).reshape(-1, 2)

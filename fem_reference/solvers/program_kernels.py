@@ -217,7 +217,7 @@ def mark(border: Bools, points: Floats, places: Floats, triangles: Ints) -> None
 def flood(border: Bools) -> Bools:
     """A mask (k, k, k) of the voxels outside ``border`` that a flood fill from (0, 0, 0) reaches through faces.
 
-    As in the program, the flood fill takes no step to a voxel with index 0.
+    As in the program, the flood fill never returns to index 0 along an axis.
     """
     outside = np.zeros(border.shape, np.bool_)
     found = np.zeros((border.size, 3), np.int64)
@@ -251,8 +251,8 @@ def march_out(inside: Bools, goals: Floats, displacements: Floats) -> tuple[Floa
     """Move points that are inside a bone back along their path. Returns their final positions (n, 3) and a mask (n,), in voxels.
 
     ``goals`` (n, 3): positions inside the bone. ``displacements`` (n, 3): vectors from there back to the start of the step. Points
-    move along them in steps of 1 until they are outside the bone. The mask is True for points that travel more than 1 farther than
-    the length of their displacement.
+    move along them in steps of 1 until they are outside the bone. The mask is True for points that travel farther than the length
+    of their displacement plus 1.
     """
     reached, too_far = goals.copy(), np.empty(len(goals), np.bool_)
     for i in range(len(goals)):

@@ -2,7 +2,7 @@
 
 The surface at rest is approximated by Gaussians with four parameters each (``geometry.gaussian_surface``). At each frame number
 
-- a few points of each attachment move with the bone, and the centres of the Gaussians are positioned so that each node of this
+- a few points of each attachment move with its bone, and the centres of the Gaussians are positioned so that each node of this
   graph moves as rigidly as possible with its neighbours (eq. 5.10 on a graph of tens of nodes);
 - centres are pushed away from bones that the surface has entered, and vertices that are still inside a bone are moved out;
 - each radius is divided by the square root of the stretch along the muscle near its centre, as stretched fibres become thinner;
@@ -87,7 +87,7 @@ class Cloud:
         return Cloud(nodes, free, cells, system)
 
     def gradients(self, now: Floats) -> Floats:
-        """Sums (k, 3, 3), for each node, of the outer products of its edges between the positions ``now`` and its edges at rest."""
+        """The sum (k, 3, 3), for each node, of the outer products of its edges at the positions ``now`` with those at rest."""
         one, other = np.repeat(np.arange(len(now)), np.diff(self.cells.starts)), self.cells.neighbours
         found = np.zeros((len(now), 3, 3))
         np.add.at(found, one, (now[one] - now[other])[:, :, None] * (self.nodes[one] - self.nodes[other])[:, None])

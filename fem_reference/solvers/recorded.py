@@ -26,11 +26,11 @@ from fem_reference.solvers.common.protocol import MuscleSolver
 
 log = logging.getLogger(__name__)
 
-# The distance [mm] (rms) of the first frame from the rest surface above which there is a warning; rounding in any format is less.
+# There is a warning if the first frame is farther than this [mm] (rms) from the rest surface; rounding in any format is less.
 AT_REST = 0.1
 # The maximum allowed distance, in diagonals of the bounding box of the rest surface: more than solvers move points in their first
-# frame, and less than the effect of a wrong unit (at a tenth of the size, the rms distance is at least 0.9 times the rms radius,
-# which is 0.26 diagonals for a sphere).
+# frame, and less than the effect of a wrong unit (at a tenth of the size, the rms distance is at least 0.9 times the rms radius:
+# 0.26 diagonals for a sphere).
 NEAR_REST = 0.05
 # The minimum size of a frame relative to rest. No solver shrinks a body so much, but coordinates in m are 1/1000 of those in mm.
 SMALLEST = 1 / 50
@@ -45,7 +45,7 @@ ABOUT = "candidate.toml"
 
 
 class RecordedSettings(Record):
-    """The location of the sequence and its unit of length.
+    """The location of the recorded frames and their unit of length.
 
     ``folder``: a folder with a mesh file for each frame, whose frame number is the last number in the file name; a .pvd or .xdmf
     file, or a folder that contains such a file; or the folder of a stored run.
@@ -61,7 +61,7 @@ class About(Record):
     ``name``, ``version``: the program that computed the sequence. ``unit``: the unit of length. ``seconds_per_frame``: the time to
     solve one frame. ``threads``: the number of threads. ``left_out``: the parts of the scene that the program does not model, in
     words. The other keys are for standings. ``group``: the group of the method. ``case``: the case. ``scene``: the key of the
-    scene, which the export states. ``sha256``: the hash of each file by name, which is checked.
+    scene, which the export states. ``sha256``: the hashes of files, by file name, which are checked.
     """
 
     name: FileName | None = None

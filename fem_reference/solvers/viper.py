@@ -6,8 +6,8 @@ radii shrink where the rod is stretched. Shape matching couples the rods of a bu
 of neighbouring points, and the scale also applies to their radii. The surface of the muscle moves with the rods.
 
 Here each fibre of the case is a rod. In the constraints on bending and twist, the bone nearest to each end of a rod acts like a
-neighbouring segment. The solver is quasi-static and has no mass. It advances by one frame number at a time: the initial guess is
-the state at the previous frame number, moved by a blend of the motions of these two bones. A stiffness is a factor on the
+neighbouring segment. The solver is quasi-static and needs no masses. It advances by one frame number at a time: the initial guess
+is the state at the previous frame number, moved by a blend of the motions of these two bones. A stiffness is a factor on the
 corrections of a sweep, as in ``pbd``, so the result depends on ``iterations``. All rods have the same radius at rest, chosen so
 that the rods together have the volume of the muscle. Only the rods keep their volume; the volume enclosed by the surface may
 change.
@@ -33,16 +33,16 @@ from fem_reference.solvers.common.lines import along, nearest_bones
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import Stiffness
 
-# The number of nearest points in a cross-section that form a group for shape matching, including the point itself, and the number
+# The number of points in a group for shape matching, which are a point of a cross-section and those nearest to it, and the number
 # of rod points that determine the motion of a vertex of the surface.
 _AROUND, _CARRIERS = 6, 12
 
 
 class ViperSettings(Record):
     """``points``: number of points of each rod. ``iterations``: sweeps over all constraints from each frame number to the next.
-    ``stretch``, ``bending``, ``volume``, ``bundle``: stiffness of each kind of constraint in a sweep, from 0 (off) to 1.
-    ``contact``: if true, each point of a rod stays away from bones by the rod radius (or by its distance at rest, if that is less),
-    and the surface is moved out of bones. The default is false.
+    ``stretch``, ``bending``, ``volume``, ``bundle`` (shape matching): stiffness of these constraints in a sweep, from 0 (off) to 1.
+    ``contact``: if true, the distance of each rod point from bones is at least the rod radius (or its distance at rest, if that is
+    less), and the surface is moved out of bones. The default is false.
     """
 
     points: Annotated[int, Field(ge=4, le=1000), Trade((4, 6, 12))]
@@ -149,7 +149,7 @@ class Rods(MovingSurface):
         self.last = number
 
     def _moved(self, ends: Ints, number: int) -> tuple[Floats, Floats]:
-        """Points and rotations of the rods if each rod moved rigidly with one bone from the last frame number to ``number``.
+        """Points and rotations of the rods if each rod moved rigidly with one bone from the previous frame number to ``number``.
 
         ``ends`` (k,): the index of this bone for each rod.
         """

@@ -1,10 +1,10 @@
 """Rods in position based dynamics: operations on quaternions, and projections of constraints.
 
-There are k rods with p points each. ``points`` (k, p, 3) [mm] and ``radii`` (k, p) [mm] belong to the points. ``turns`` (k, p + 1,
-4) are unit quaternions (w, x, y, z), which rotate the frames of segments from rest; the first and the last quaternion of a rod are
-the rotations of the two bones, which prescribe its end points. All constraints of a kind are projected simultaneously (Jacobi),
-with steps small enough that the sum of neighbouring steps does not overshoot. If constraints contradict each other, sweeps converge
-to the minimum of the sum of squared errors, which does not depend on the order of the points.
+There are k rods with p points each. ``points`` (k, p, 3) [mm]: their positions. ``radii`` (k, p) [mm]: the radii there. ``turns``
+(k, p + 1, 4) are unit quaternions (w, x, y, z), which rotate the frames of segments from rest; the first and the last quaternion of
+a rod are the rotations of the two bones, which prescribe its end points. All constraints of a kind are projected simultaneously
+(Jacobi), with steps small enough that the sum of neighbouring steps does not overshoot. If constraints contradict each other,
+sweeps converge to the minimum of the sum of squared errors, which does not depend on the order of the points.
 """
 
 import numpy as np

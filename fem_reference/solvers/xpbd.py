@@ -4,9 +4,9 @@ Macklin, Mueller and Chentanez 2016, "XPBD: position-based simulation of complia
 10.1145/2994258.2994272; the method is mentioned in report section 5.5.3. The surface is a membrane with mass, and its interior
 resists changes of volume. In position based dynamics, which has the same constraints, each additional sweep or step increases the
 stiffness. In XPBD, too few sweeps make the muscle too soft, and enough sweeps give an implicit Euler step. The equilibrium depends
-on the time step only if directions change within a step. This holds if the sweeps resolve a step, which needs ``sqrt(k / m) dt`` of
-the stiffest edges below about 1, or more sweeps. With the settings for Table 5.1, which use one sweep, this value is 3 (1.1 for
-half of the edges): doubling the sub-steps changes positions of hip_flexion by up to 1.6 mm (mean 0.7 mm; displacement 53 mm).
+on the time step only if directions change within a step. This holds if the sweeps converge in each step, which needs more sweeps or
+``sqrt(k / m) dt`` below about 1 for the stiffest edges. With the one sweep of Table 5.1 it is up to 3, and above 1.1 for half of
+the edges: doubling the sub-steps changes positions in hip_flexion by up to 1.6 mm (mean 0.7 mm; displacement 53 mm).
 
 Frame number n is the state after iteration n, ``frame_time`` after the previous frame. Bones move at constant velocity in between.
 """
@@ -49,7 +49,7 @@ class XpbdSettings(Record):
     the number of time steps in a ``frame_time``. ``sweeps``: the number of sweeps over all constraints in each time step.
     ``density`` [t/mm3]: the density of the enclosed body, whose mass is divided among the vertices in proportion to their areas.
 
-    ``stretch`` [N/mm]: Young's modulus times thickness, of a membrane. ``bending`` [N mm]: the bending stiffness of a plate.
+    ``stretch`` [N/mm]: Young's modulus times the thickness of a membrane. ``bending`` [N mm]: the bending stiffness of a plate.
     ``volume`` [MPa]: the bulk modulus of the enclosed body. ``damping`` [1/s]: the rate at which velocities decay. ``collision``:
     contact with bones.
     """
@@ -69,10 +69,10 @@ class XpbdSettings(Record):
 class XpbdConstraints:
     """Compliant constraints that pull a body towards its rest state: edges, an enclosed volume, hinges. Each kind may be absent.
 
-    ``inverse_masses`` (n,) [1/t]: 0 for attached points. ``edges`` (e, 2), in any graph, with their ``lengths`` at rest (e,) [mm]
-    and compliances ``edge_softness`` (e,) [mm/N]. ``triangles`` (m, 3), which form a closed surface, with six times the volume
-    inside at rest, ``six_volumes`` [mm3], and its compliance ``volume_softness`` [mm5/N]. ``hinges`` (h, 4) with their ``angles``
-    at rest (h,) [rad] and compliances ``hinge_softness`` (h,) [1/(N mm)].
+    ``inverse_masses`` (n,) [1/t]: 0 for attached points. ``edges`` (e, 2), which may form any graph, with their ``lengths`` at rest
+    (e,) [mm] and compliances ``edge_softness`` (e,) [mm/N]. ``triangles`` (m, 3), which form a closed surface, with six times the
+    volume inside at rest, ``six_volumes`` [mm3], and its compliance ``volume_softness`` [mm5/N]. ``hinges`` (h, 4) with their
+    ``angles`` at rest (h,) [rad] and compliances ``hinge_softness`` (h,) [1/(N mm)].
     """
 
     inverse_masses: Floats

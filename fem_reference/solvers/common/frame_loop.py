@@ -33,7 +33,7 @@ class FrameModel(Protocol):
     advice: str
 
     def move(self, number: int, /) -> None:
-        """Advance to frame ``number``. The time of this call is the time to solve."""
+        """Advance to frame ``number``. The time of this call counts as the time to solve."""
 
     def trouble(self) -> Trouble | None:
         """The trouble with the present state, which ends the run; None if there is none."""
@@ -48,8 +48,8 @@ class FrameModel(Protocol):
 def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> Outcome:
     """Advance a ``model`` from rest at the first frame of ``setup`` through every frame number; requested frames go to ``sink``.
 
-    ``per_frame``: the number of parts into which the model divides a frame number; bones move to their pose at the end of each
-    part. The status is *out of steps* if a bone moves too far in one part. Raises InputError if there are too many frame numbers.
+    ``per_frame``: the number of parts into which the motion to the next frame number is divided; bones move to their pose at the
+    end of each. The status is *out of steps* if a bone moves too far in a part. Raises InputError for too many frame numbers.
     """
     frames = setup.frames
     if frames[-1] - frames[0] > MOST_FRAMES:
@@ -113,7 +113,7 @@ def _begun(model: FrameModel) -> dict[str, float]:
 def timed[M: FrameModel, S: Record](
     make: Callable[[Any, S], M], setup: Setup, settings: S, quick: S | None = None
 ) -> M:
-    """The model that ``make`` creates from ``setup`` and ``settings``, with two times in its cost.
+    """The model that ``make`` creates from ``setup`` and ``settings``, with two durations in its cost.
 
     ``seconds_compile``: the time to solve one frame of a tetrahedron beforehand, which compiles all functions; it uses the settings
     ``quick`` if they are given. ``seconds_setup``: the time to create the model.

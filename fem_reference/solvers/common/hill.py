@@ -25,7 +25,7 @@ from fem_reference.foundations.units import Angle, Force, PositiveLength
 _WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN, _LENGTHENING = 0.45, 5.0, 0.6, 0.04, 1.4
 # The toe of the tendon's curve ends at the fraction _TOE of F0 and has the shape _TOE_SHAPE; beyond the toe the curve is a tangent.
 _TOE, _TOE_SHAPE = 0.33, 3.0
-_TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # at the end, times the strain there
+_TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # at its end, times the strain there
 _TOE_STRAIN = _TENDON_STRAIN * _TOE_SLOPE / (_TOE_SLOPE + 1 - _TOE)
 # Fibre lengths [l0] in equilibrium are searched between _SHORTEST and _LONGEST in steps of about _STEP.
 _SHORTEST, _LONGEST, _STEP = 0.1, 3.0, 0.0075
@@ -37,8 +37,8 @@ class Hill(Record):
     """A muscle and its tendon.
 
     ``max_force`` [N]: the maximum isometric force F0. ``optimal_length`` [mm]: the optimal fibre length l0. ``slack_length`` [mm]:
-    the slack length of the tendon. ``pennation`` [rad]: the angle of fibres of optimal length. ``max_velocity`` [l0 / s]: the
-    velocity of shortening without load. ``curvature``: a / F0 of eq. 5.1.
+    the slack length of the tendon. ``pennation`` [rad]: the angle between tendon and fibres of optimal length. ``max_velocity``
+    [l0 / s]: the velocity of shortening without load. ``curvature``: a / F0 of eq. 5.1.
     """
 
     max_force: Force
@@ -122,7 +122,7 @@ class Hill(Record):
 
 
 class HillSettings(Record):
-    """Settings of lines that are equally strong Hill-type muscles with tendons, in equilibrium at each frame (section 5.1).
+    """Settings of lines that are equally strong Hill-type muscles with tendons, in equilibrium at each frame (report 5.1).
 
     ``max_force``: the sum of the maximum isometric forces of all lines. ``fibre_share``: the optimal fibre length of a line divided
     by the length of the line at the first frame, where the tendon is just slack. ``pennation``: the angle between fibres and tendon
@@ -175,8 +175,8 @@ def _strain(force: float) -> float:
 def inverse_hyperbola(force: float, curvature: float) -> float:
     """The velocity of shortening divided by its maximum, at a ``force`` divided by the isometric force: eq. 5.1 solved for v.
 
-    In lengthening the force rises to 1.4 along a hyperbola that is twice as steep at velocity 0 (Thelen 2003). Beyond their ends
-    both curves continue as tangents.
+    In lengthening the force rises to 1.4 times the isometric force along a hyperbola that is twice as steep at velocity 0 (Thelen
+    2003). Beyond their ends both curves continue as tangents.
     """
     slope, rise = 2 * (1 + 1 / curvature), _LENGTHENING - 1
     if force < 0:  # shortening faster than without load

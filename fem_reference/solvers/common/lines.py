@@ -33,7 +33,7 @@ class Via(Record):
 
     ``at``: the position of the point at rest, as a fraction of the fibre's length. ``joint``: a joint whose angle affects the
     point. ``within``: the minimum and maximum angle at which lines pass through the point; at other angles they skip it. ``curve``:
-    positions of the point on the bone at some angles, which are the same for all fibres. Between these angles the point moves along
+    positions of the point on the bone at some angles, the same positions for all fibres. Between these angles it moves along
     Catmull-Rom splines, with the slopes of parabolas through neighbouring positions; beyond them it stays at the first or last
     position. With ``curve``, ``at`` only determines the order of the points.
     """

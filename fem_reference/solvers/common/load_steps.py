@@ -53,7 +53,7 @@ class Step:
 
 @dataclass(frozen=True)
 class StepSizes:
-    """The sizes of load steps, in frame numbers: the ``first``, the ``smallest`` and the ``largest``, None without a maximum.
+    """The sizes of load steps, in frame numbers: the ``first``, the ``smallest`` and the ``largest`` (None: no maximum).
 
     ``stops``: increasing frame numbers at which a load step must end.
     """

@@ -28,7 +28,7 @@ CONVENTIONS = {
 
 
 def write(problem: MuscleProblem, folder: Path, of: Mapping[str, str]) -> None:
-    """Write all files of a ``problem``, without documentation, into ``folder``. ``of``: facts that identify the case."""
+    """Write all files of a ``problem``, except documentation, into ``folder``. ``of``: facts that identify the case."""
     (folder / "bones").mkdir()
     files.write_surface(folder / "muscle.ply", problem.surface, problem.surface.points)
     for bone, name in zip(problem.bones, bone_files(problem), strict=True):

@@ -16,7 +16,7 @@ from typing import IO
 from fem_reference.foundations.subprocesses import peak_memory, processor_times
 from fem_reference.runs.contents import Status
 
-# The limit on clock time divided by the limit on processor time. A program that takes longer waits, or the machine is too busy.
+# The limit on clock time divided by the limit on processor time. A program that takes longer is waiting, or the machine is busy.
 CLOCK = 10
 # The time between two checks of a program: a fraction of the clock time so far, between a minimum and a maximum [s].
 _SHARE, _GLANCES = 0.05, (0.05, 1.0)
@@ -28,7 +28,7 @@ class Ended:
     """The end of a program.
 
     ``code``: the exit status; if negative, the signal. ``seconds``: the clock time. ``processor``: the processor time [s],
-    including that of processes for which the program waited. ``memory`` [MB]: the maximum peak memory of a process in all checks.
+    including that of processes for which the program waited. ``memory`` [MB]: the maximum peak memory of one of its processes.
     ``said``: the last line that was printed. ``limit``: the status and the reason if a limit ended the program, otherwise None.
     """
 

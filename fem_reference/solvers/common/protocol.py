@@ -24,7 +24,7 @@ type Solve[P, S: Record] = Callable[[P, S, Sink], Outcome]
 type GoOn[P, S: Record] = Callable[[P, S, Sink, CutOff], Outcome]
 # Raises InputError, with a key inside a given place, if the settings do not suit the effects of a scene.
 type CheckEffects[S: Record] = Callable[[S, tuple[Effect, ...], str], None]
-# Raises InputError, with a key inside a given place, if the settings do not suit bones, attachments, fibres or boundary of a case.
+# Raises InputError, with a key inside a given place, if settings do not suit the bones, attachments, fibres or boundary of a case.
 type CheckProblem[S: Record] = Callable[[S, Any, str], None]
 
 

@@ -29,13 +29,13 @@ _GROWTH = 10.0  # a Newton step is halved if the residual grows by at least this
 
 
 class ScikitBodySettings(Record):
-    """Numerical settings for a body; load steps are in frame numbers.
+    """Numerical settings for a body; the sizes of load steps are in frame numbers.
 
-    ``element``: one of ``body.ELEMENTS``. ``first_step``: the size of the first load step, by default one step per frame. The size
-    grows by half after an easy step (at most 5 Newton iterations). It is halved, down to ``smallest_step``, if Newton's method
-    needs more than ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]: Newton's method ends when the norm of the nodal
-    forces and of the residual of the volume equation is below this value. ``quadrature_degree``: the degree of the polynomials that
-    are integrated exactly on a straight cell, by default as the element requires.
+    ``element``: P1, P1/P1, P2, P2/P0 or P2/P1 (tetrahedra), Q1, Q1/P0, Q2 or Q2/Q1 (hexahedra). ``first_step``: the first load
+    step, by default one step per frame. The size grows by half after an easy step (at most 5 Newton iterations). It is halved, down
+    to ``smallest_step``, if Newton's method needs more than ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3]:
+    Newton's method ends when the norm of the residual (nodal forces, errors of the volume equation) is below this value.
+    ``quadrature_degree``: polynomials of this degree are integrated exactly on a straight cell; the default suits the element.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
