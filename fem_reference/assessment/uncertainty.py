@@ -1,4 +1,4 @@
-"""Records of uncertainty: the band of a case's results with unknown parameters, its sensitivities, and candidates in the band."""
+"""Records of uncertainty: bands of a case's results for uncertain parameters, sensitivities, and candidates compared with bands."""
 
 import math
 from dataclasses import dataclass, field
@@ -70,7 +70,7 @@ class Failure:
 class Band:
     """The band of a ``quantity`` over frame ``numbers`` (f,), in ``unit``.
 
-    ``low``, ``median`` and ``high`` (f,): the 5th, 50th and 95th percentile. ``nominal`` (f,): the result of the case. All are NaN
+    ``low``, ``median`` and ``high`` (f,): the 5th, 50th and 95th percentiles. ``nominal`` (f,): the result of the case. All are NaN
     in frames in which the quantity is not defined. ``bar`` (f,): the numerical error bar of the result of the case, None if it has
     none. ``distance``: True if the quantity is a distance from the result of the case; then values below the band are inside too.
 
