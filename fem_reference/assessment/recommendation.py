@@ -75,9 +75,7 @@ class Recommendation:
 
 @dataclass(frozen=True, eq=False)
 class KnownSettings:
-    """All ``settings`` for a case, with ``margins``. ``of``: the cases on which they were measured; ``measured``: True if they were
-    measured on the case itself.
-    """
+    """All ``settings`` for a case, with ``margins``; ``of`` and ``measured`` as in :class:`Recommendation`."""
 
     settings: tuple[Expected, ...]
     margins: Margins
@@ -120,9 +118,7 @@ def known_settings(features: Features, case: str, studies: Sequence[CaseStudy], 
 
 
 def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> Sequence[CaseStudy]:
-    """The ``studies`` comparable with a case with these ``features``. Errors that are lengths scale with the motion of the bones,
-    so the bones must move.
-    """
+    """The ``studies`` comparable with a case with these ``features``. Lengths scale with motion, so the bones must move."""
     if _is_share(metric):
         return studies
     if not features["motion"] > 0:
@@ -239,9 +235,7 @@ def is_elsewhere(point: Point) -> bool:
 
 
 def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
-    """The size of a point's tetrahedra relative to its case's, before refinement, and how many fewer refinements it has than
-    the case.
-    """
+    """The size of a point's unrefined tetrahedra divided by its case's, and how many fewer refinements it has than its case."""
     scene = point.choice["scene"]
     size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
     return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]

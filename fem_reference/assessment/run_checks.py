@@ -26,15 +26,13 @@ from fem_reference.runs.store import Run
 
 # The accuracy of positions as a fraction of the size of the body; the rounding of stored values is a thousandth of this.
 ROUNDING = 1e-9
-# Exactly attached vertices may be off their position on the bone by this strain (a stretch of 4) times their distance from attached
-# facets.
+# The error of exactly attached vertices may be this strain (a stretch of 4) times their distance from the attached facets.
 _STRAIN = 3.0
 # Safety factor on the mean extension of springs that follows from the recorded force, as springs do not pull at vertices.
 _SPRINGS = 1.5
 # The maximum rotation of a bone per load step, on average between two frames; beyond it the sense of rotation is unknown.
 _TURN = 1.01 * math.pi / 2
-# The penetration of a crease between contact points, as a fraction of the spacing; less than ``BETWEEN``, that of a right-angled
-# edge.
+# The penetration of a crease between contact points, as a fraction of the spacing; a right-angled edge has more (``BETWEEN``).
 _CREASE = 0.1
 # The penetration that self-contact of a part allows, for any recorded pressure, is less than this fraction of the spacing.
 _OWN = 0.5
@@ -100,9 +98,7 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch. Overlap due to smoothing, compliance and gaps between points is allowed, as is overlap that
-    remains from rest.
-    """
+    """Overlap of parts that may touch; overlap due to smoothing, compliance, gaps between points and the rest state is allowed."""
     for law in body.touching:
         edge, between, depth = longest_edge(body.mesh, law), unseen(body.mesh, law), partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0

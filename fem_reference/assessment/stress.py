@@ -18,8 +18,8 @@ VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 
 class Bound(Record):
-    """A bound that a healthy run satisfies: a ``quantity`` of :mod:`health` is at most ``at_most`` in every frame or in the
-    last one.
+    """A bound that a healthy run satisfies: a ``quantity`` of :mod:`health` is at most ``at_most``, in every frame or, if
+    ``frame`` is "last", in the last frame.
     """
 
     quantity: str

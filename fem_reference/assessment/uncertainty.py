@@ -77,7 +77,8 @@ class Band:
     ``error``: the error of the surrogate at runs that were excluded from its fit, as a fraction of the variance; NaN without a
     surrogate. ``by``: the source of the percentiles, ``"process"`` (a Gaussian process) or ``"runs"``. ``refused``: the reason why
     there is no band. ``first`` and ``total``: by the key of a parameter, the fraction of the variance over all frames that is due
-    to it, alone and together with others; empty if the surrogate is not accurate enough, with the reason in ``unreliable``.
+    to it alone (``first``) or also together with others (``total``); empty if the surrogate is not accurate enough, with the reason
+    in ``unreliable``.
     """
 
     quantity: str

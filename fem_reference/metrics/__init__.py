@@ -267,8 +267,8 @@ def at_rest(run: Run) -> Run:
 
 def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
     """All statistics of the change from rest of a ``run`` by the reference's solver, measured on the fibres of this run: if
-    overlaps with bones are removed first, the fibres of two runs differ at rest, and a surface would have to carry the fibres of
-    another run.
+    overlaps with bones are removed at the start, the fibres of two runs differ at rest, and otherwise a surface would have to carry
+    the fibres of another run.
     """
     own = context if run.fibres is None else replace(context, fibres=run.fibres)
     return measure(run, at_rest(run), own, wanted)
