@@ -1,5 +1,4 @@
-"""A Gaussian process: an approximation to a function of a few uniformly distributed variables, from values in runs; and
-sensitivities.
+"""A Gaussian process: an approximation to a function of a few uniformly distributed variables, from runs, and sensitivities.
 
 The process has a linear trend and a squared exponential covariance with a length scale for each variable. The length scales and the
 noise maximise the profile likelihood (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sections 2.7 and

@@ -94,7 +94,7 @@ def recommend(
 
 
 def chosen(known: Sequence[Expected], limits: Mapping[str, float]) -> tuple[Expected | None, Expected | None]:
-    """The best setting within the ``limits`` or, if there is none, None and the setting that exceeds the limits least.
+    """The best setting within the ``limits`` and None or, if there is none, None and the setting that exceeds the limits least.
     With a limit ``"error"`` the cheapest setting is the best; with only a limit ``"time"`` [s] per frame, the most accurate.
     """
     most = {"error": math.inf, "time": math.inf} | dict(limits)
