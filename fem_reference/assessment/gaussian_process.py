@@ -1,4 +1,4 @@
-"""A Gaussian process: an approximation to a function of a few uniformly distributed variables, from runs, and sensitivities.
+"""Approximation of a function of a few uniformly distributed variables by a Gaussian process fitted to runs; its sensitivities.
 
 The process has a linear trend and a squared exponential covariance with a length scale for each variable. The length scales and the
 noise maximise the profile likelihood (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sections 2.7 and

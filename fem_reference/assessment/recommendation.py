@@ -94,8 +94,8 @@ def recommend(
 
 
 def chosen(known: Sequence[Expected], limits: Mapping[str, float]) -> tuple[Expected | None, Expected | None]:
-    """The best setting within the ``limits`` and None or, if there is none, None and the setting that exceeds the limits least.
-    With a limit ``"error"`` the cheapest setting is the best; with only a limit ``"time"`` [s] per frame, the most accurate.
+    """The best setting within the ``limits``, None if there is none; and, only if there is none, the setting that exceeds them
+    least. With a limit ``"error"`` the cheapest setting is the best; with only a limit ``"time"`` [s] per frame, the most accurate.
     """
     most = {"error": math.inf, "time": math.inf} | dict(limits)
     fitting = [one for one in known if one.error <= most["error"] and one.time <= most["time"]]
