@@ -17,7 +17,7 @@ MISSING = 0.05
 # The minimum number of runs for percentiles without a surrogate: the 5th and the 95th percentile must lie between values of runs.
 FEWEST = 20
 PERCENTILES = (0.05, 0.5, 0.95)
-_SAMPLES = 15  # the number of samples, as a power of 2
+_SAMPLES = 15  # the base-2 logarithm of the number of samples
 _SHARE = 1e-6  # the maximum fraction of a field's variance in the principal components that are neglected
 
 

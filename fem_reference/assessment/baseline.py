@@ -37,7 +37,7 @@ SAMPLED = 64
 MOVED = 0.1
 # The tolerance of a statistic is at most this fraction of its maximum over the frames.
 SHARE = 0.02
-# The allowed value is the measured value times this factor, to allow for rounding.
+# New limits of the distance from the reference are larger by this factor, to allow for rounding.
 _ROUNDING = 1 + 1e-6
 README = (
     "tolerance: the allowed distance of a value from the value stored here; within: its allowed distance from the reference, in "

@@ -1,4 +1,4 @@
-"""Parameters of a case fitted to measurements by least squares, with confidence intervals and undetermined parameters."""
+"""Least-squares fits of parameters of a case to measurements, with confidence intervals and a test for undetermined parameters."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -168,8 +168,8 @@ class _Residuals:
 
 
 def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measurement], case: str) -> Calibration:
-    """Fit the parameters, within their ranges, so that the values of ``forward`` are nearest to the measurements (``rows``) in
-    standard deviations.
+    """Fit the parameters, within their ranges, so that the values of ``forward`` are nearest to the measurements (``rows``),
+    with distances in standard deviations.
 
     The fit starts from the values of the case, and retreats from a point without a result. If the starting point, or a point at
     which sensitivities are needed, has no result, the fit ends and states this reason. Raises InputError unless there are more

@@ -30,9 +30,9 @@ class Lab(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """The result of a measurement: the measured ``value``. ``ladder``: on several meshes, the (mesh size [mm] or time step [s],
-    value) of each, from coarse to fine. ``order``: the order of convergence of the error on the ladder. ``note``: further facts for
-    readers.
+    """The result of a measurement: the measured ``value``. ``ladder``: for each of several meshes or time steps, its size ([mm]
+    or [s]) and the value, from coarse to fine. ``order``: the order of convergence of the error on the ladder. ``note``: further
+    facts for readers.
     """
 
     value: float

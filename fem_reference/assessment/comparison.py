@@ -24,8 +24,9 @@ from fem_reference.scenes.case import Case, Expectation
 
 @dataclass(frozen=True)
 class Convergence:
-    """The convergence of an ``element`` on meshes whose size is halved from each mesh to the next: the ``cells`` and ``errors`` of
-    each mesh, and the ``order`` of convergence on the two finest meshes, NaN if the errors are only rounding errors.
+    """The convergence of an ``element`` on meshes whose size is halved from each mesh to the next: the number of ``cells`` and
+    the error (``errors``) of each mesh, and the ``order`` of convergence on the two finest meshes, NaN if the errors are only
+    rounding errors.
 
     ``against``: the definition of the error, in words: the L2 distance to the exact solution, or the rms distance at the vertices
     from the finest solution of order 2.
@@ -45,7 +46,7 @@ class Comparison:
     ``setup``: the ``Setup`` of a muscle, or the ``FieldProblem``. ``deviations``: the measures of each candidate against the
     reference, by the name of the candidate. ``changes``: the measures of each run against the rest state, by the name of the run
     (including ``"reference"``); for a field, which has no rest state, the measures that need no reference. ``extension_error``
-    [mm]: for each frame, the maximum error of fibre lengths that are extended from the reference's surface, None without an
+    [mm]: for each frame, the maximum error of the lengths of fibres carried by the reference's surface, None without an
     extension. ``error_bars``: the error bars of the reference, None if they were not computed. ``ladders``: the convergence of the
     reference on refined meshes, if it was measured.
     """

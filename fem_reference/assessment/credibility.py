@@ -63,8 +63,8 @@ class Beside:
     """A ``value`` of the model compared with a known value (``truth``), both in ``unit``.
 
     ``within``: the uncertainty of the known value. ``n``: the number of specimens, None if unknown. ``met``: True if the values
-    agree. ``validates``: True if agreement counts as validation. ``rests_on``: the text in which the known value was read, with
-    notes on a tolerance that was chosen and on a recalled model. ``kind``: measurement, or model if the known value is that of
+    agree. ``validates``: True if agreement counts as validation. ``rests_on``: the kind of text in which the known value was read,
+    with notes on a tolerance that was chosen and on a recalled model. ``kind``: measurement, or model if the known value is that of
     another model. ``is_order``: True for a ranking of stiffnesses: the value is 1 if the ranking is reproduced and 0 if it is not,
     and the tolerance is 0.5.
     """
@@ -96,8 +96,8 @@ class Row:
     """A quantity (``claim``) with its evidence.
 
     ``kinds``: the number of catalogue entries of each kind that verify the quantity. ``orders``: the orders of convergence that
-    these entries must show. ``band``: the facts with the minimum and the maximum difference of models. ``beside``: the comparisons
-    with experiments.
+    these entries must show. ``band``: the facts with the minimum and the maximum difference between models and real
+    muscles. ``beside``: the comparisons with experiments.
     """
 
     claim: Evidence
@@ -108,7 +108,7 @@ class Row:
 
     @property
     def measured(self) -> tuple[int, int]:
-        """The number of measurements with which the model agrees to within their uncertainty, and the number of measurements."""
+        """The number of measurements with which the model agrees to within their uncertainty, and of all measurements."""
         return count(self.beside, "measurement")
 
     @property
@@ -160,7 +160,7 @@ def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result]
     """The row of a ``claim``. ``entries``: all entries of the catalogue. ``results``: the results of experiments, by name.
     ``arms``: moment arms compared with published ones.
 
-    Raises KeyError if an experiment was not measured, and LookupError if a group of the catalogue does not exist.
+    Raises KeyError if an experiment has no result, and LookupError if a group of the catalogue does not exist.
     """
     behind = verifying(claim, entries)
     orders = {one.refinement.order for one in behind if one.refinement and one.refinement.order is not None}
@@ -171,8 +171,8 @@ def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result]
 
 
 def of_result(found: Result) -> Beside:
-    """The comparison that a measured catalogue entry of the kind "experiment" makes. It validates only if all its facts validate
-    and no part of its model is recalled from memory.
+    """The comparison that a result of a catalogue entry of the kind "experiment" makes. It validates only if all facts of the entry
+    validate and no part of its model is recalled.
     """
     entry = found.entry
     facts = entry.facts
@@ -200,8 +200,8 @@ def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> 
 def of_arms(arms: ArmsBeside) -> Beside:
     """The comparison of moment arms with a published curve or range.
 
-    A measured curve should lie within the range of the fibres in all poses. The range of another model should be covered to the
-    same percentage as by the moment arms of Modenese and Kohout 2020.
+    A measured curve should lie within the range of the fibres in all poses. Of the range of another model, the fibres should
+    cover at least the percentage that the moment arms of Modenese and Kohout 2020 cover.
     """
     others_reach = reached(arms)
     inside = "poses with the measured moment arm inside the fibres' range"
@@ -221,7 +221,7 @@ def of_arms(arms: ArmsBeside) -> Beside:
 
 
 def reached(arms: ArmsBeside) -> float:
-    """The percentage for the fibres of Modenese and Kohout 2020 on the same body: of poses with the curve inside, or of overlap."""
+    """The percentage of poses with the curve inside, or of overlap, for the fibres of Modenese and Kohout 2020 on the same body."""
     quantity = "share_inside" if arms.is_curve else "overlap"
     return experiments.find("modenese_kohout_2020", quantity, arms.muscle.replace("_", " ")).value
 

@@ -1,4 +1,4 @@
-"""Sizes of differences between two runs; if a difference is small by chance, its average over frames or statistics is used."""
+"""Sizes of differences between two runs; if one is small by chance, an average over frames or statistics is used instead."""
 
 import math
 
@@ -10,7 +10,9 @@ from fem_reference.runs.store import Run
 
 # Prefixes of statistics that are the value at a single point, each with the prefix of the corresponding average over points.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
-_LEAST = 0.5  # averages of changes differ by at least this fraction of the distance of the runs; less is due to chance
+_LEAST = (
+    0.5  # averages of changes differ by at least this fraction of the distance between the runs; less is due to chance
+)
 _MOVED = 0.01  # if a surface has moved by less than this fraction of its maximum motion, ratios to the motion have no meaning
 
 

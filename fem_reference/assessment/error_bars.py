@@ -1,4 +1,4 @@
-"""Error bars of every statistic in each frame, from further solutions of the reference with coarser numerics.
+"""Error bars of every statistic in each frame, from further runs of the reference with coarser numerics.
 
 There are two kinds of bars. The bar of a candidate's deviation from the reference is the deviation of the reference's runs from
 each other: by the triangle inequality, another reference changes the candidate's deviation by at most this amount. The bar of the
@@ -61,8 +61,8 @@ class ErrorBar:
     ``values`` (f,): the possible error of the statistic due to the reference, in ``unit``, NaN if unknown. ``parts``: the maximum
     contribution of each source of error over the frames.
 
-    ``model`` (f,): the change of the statistic under another model of spring attachments: with exact attachments if these were
-    solved, and for a force or moment at least ``SPREAD`` of its value. NaN where exact attachments could not be solved; None
+    ``model`` (f,): the change of the statistic under another model of spring attachments: with exact attachments if there is
+    such a run, and for a force or moment at least ``SPREAD`` of its value. NaN where that run has no solution; None
     without springs, or if no other model was solved. This is not an error of the present model, so it is not part of ``values``.
     """
 
@@ -121,7 +121,7 @@ class Pair:
     springs: bool = False
 
     def share(self, metric: str, statistic: str) -> float:
-        """The ratio of the fine run's error bar to the difference between both runs, as in a grid convergence index."""
+        """The ratio of the fine run's error bar to the difference between the two runs, as in a grid convergence index."""
         stated = described()[metric, statistic]
         order = ORDER_OF_WORST if stated.local else ORDER
         safety = self.safety * (LONE_FIBRE if stated.lone else 1.0)
@@ -167,7 +167,7 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
 
 def _model(one: Measure, exact: Floats | None, own: Floats | None) -> Floats | None:
     """The change (f,) of the statistic ``one`` under another model of springs. ``exact`` (f,): its change with exact attachments,
-    if solved. ``own`` (f,): its value in the reference; a force or moment also changes with springs that are distributed
+    if known. ``own`` (f,): its value in the reference; a force or moment also changes with springs that are distributed
     differently.
     """
     forces = one.metric == "joint_moment" and one.statistic != "arm"

@@ -1,4 +1,4 @@
-"""Errors of the report's estimation techniques (chapter 3, section 7.1), as records."""
+"""Errors of the estimation techniques in the report DCSE/TR-2022-03 (chapter 3, section 7.1), as records."""
 
 from dataclasses import dataclass
 
@@ -34,8 +34,8 @@ class HeightError:
 
 @dataclass(frozen=True)
 class FitError:
-    """The error of a fit by ``gaussians`` to the surface of a muscle with ``vertices``: the rms and the maximum (``greatest``)
-    distance of the vertices [mm], and the ratio of the volumes (``volume``).
+    """The error of a fit by a number of ``gaussians`` to a muscle's surface with a number of ``vertices``: the rms and the maximum
+    (``greatest``) distance of the vertices [mm], and the ratio of the fitted volume to the muscle's (``volume``).
     """
 
     case: str
@@ -73,8 +73,8 @@ class DecompositionError:
 @dataclass(frozen=True)
 class RodError:
     """The error of representing a muscle by ``rods`` of one ``radius`` [mm] along its fibres, which together have the volume of the
-    muscle, as in ``viper`` at rest. ``filled``: the fraction of the muscle that is filled. ``outside`` and ``overlap``: the
-    fractions of the rods that lie outside the muscle and that overlap.
+    muscle, as in ``viper`` at rest. ``filled``: the fraction of the muscle that is filled. ``outside``: the fraction of
+    the rods that lies outside the muscle. ``overlap``: the fraction of the rods' total volume that is lost because rods overlap.
     """
 
     case: str

@@ -51,8 +51,8 @@ class Experiment(Record):
     """An experiment of a ``kind``: a measurement, a model, or bands from several publications.
 
     ``specimen`` and ``boundary``: the specimen and the boundary conditions. ``repeated`` and ``not_repeated``: the parts of the
-    experiment that a scene repeats, and those that it does not repeat. ``file``: a full curve, in the folder that the environment
-    variable ``FEM_REFERENCE_DATA`` names.
+    experiment that a scene repeats, and those that it does not repeat. ``file``: a file with a full curve, in the folder that the
+    environment variable ``FEM_REFERENCE_DATA`` names.
     """
 
     title: _Text
@@ -66,7 +66,7 @@ class Experiment(Record):
 
 
 def facts(folder: Path = FOLDER) -> Iterator[Fact]:
-    """All measured numbers of a ``folder``. Raises InputError, with the line, if a row is incomplete or invalid."""
+    """All measured numbers in a ``folder``. Raises InputError, with the line, if a row is incomplete or invalid."""
     with (folder / NAME).open(encoding="utf-8", newline="") as file:
         for line, row in enumerate(csv.DictReader(file, strict=True), 2):
             yield _fact(row, f"{NAME}:{line}")
@@ -85,7 +85,7 @@ def _fact(row: dict[str, str], place: str) -> Fact:
 
 
 def experiments(folder: Path = FOLDER) -> dict[str, Experiment]:
-    """The records of all experiments of a ``folder``, by name."""
+    """The records of all experiments in a ``folder``, by name."""
     paths = sorted(folder.glob("*.toml"))
     return {path.stem: parse(Experiment, tomllib.loads(path.read_text(encoding="utf-8")), path.name) for path in paths}
 

@@ -46,6 +46,6 @@ def _apart(run: Run, other: Run, context: MeasurementContext) -> Floats:
 
 
 def _length(kind: str, bone: str, run: Run, other: Run | None = None) -> Floats:
-    """The magnitude (f,) of the force or moment on a ``bone`` in a ``run``, or of its difference from that in an ``other`` run."""
+    """The magnitude (f,) of the force or moment on a ``bone`` in a ``run``, or of its difference from that in another run."""
     vectors = [one.force(bone) if kind == "force" else one.moment(bone) for one in (run, other) if one is not None]
     return np.asarray(np.linalg.norm(vectors[0] - (vectors[1] if other else 0.0), axis=1))

@@ -25,7 +25,8 @@ COSTS: dict[str, tuple[str, str]] = {
     "projections": ("projections of a constraint", ""),
     "peak_memory_mb": ("peak memory", "MB"),
 }
-# The name of the cost that states the fraction of the machine that other processes use, and the fraction that slows a run down.
+# The name of the cost that states the fraction of the machine that other processes use, and the fraction above which a run counts
+# as slowed down.
 LOAD, LOADED = "load_by_others", 0.1
 # The keys of a scene that define its tetrahedra.
 TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
@@ -137,7 +138,7 @@ def solvers(points: Iterable[Point]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Match:
-    """The best point of each solver whose error or cost (``same``) is at most ``at``; the best of all comes first."""
+    """For each solver, the best point whose error or cost (``same``) is at most ``at``; the best of all comes first."""
 
     same: str
     at: float

@@ -1,4 +1,4 @@
-"""A Gaussian process: an approximation to a function of a few uniform variables, from its values in runs, and its sensitivities.
+"""Approximation of a function of a few uniformly distributed variables by a Gaussian process fitted to runs; its sensitivities.
 
 The process has a linear trend and a squared exponential covariance with a length scale for each variable. The length scales and the
 noise maximise the profile likelihood (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sections 2.7 and
@@ -20,7 +20,7 @@ _GROUPS = 10  # the number of groups of runs; each group is left out in turn
 _LENGTHS, _NOISE = (0.2, 40.0), (1e-10, 0.1)  # limits; the noise is relative to the variance about the trend
 _START = 1.0, 1e-4
 _LEAST = 1e-24  # the minimum variance about the trend, as a fraction of the squared outputs, which the trend may reproduce exactly
-_SAMPLES = 13  # the number of samples, as a power of 2
+_SAMPLES = 13  # the base-2 logarithm of the number of samples
 
 
 @dataclass(frozen=True, eq=False)

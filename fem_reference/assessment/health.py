@@ -231,7 +231,7 @@ QUANTITIES: dict[str, Callable[[Followed], Found]] = {one.__name__: one for one 
 
 
 def unstable(run: Followed) -> str:
-    """The frames in which a run is an unstable equilibrium, in words; empty without such frames, or if modes were not counted."""
+    """The frames in which a run is in unstable equilibrium, in words; empty without such frames, or if modes were not counted."""
     if run.negative_modes is None or not (run.negative_modes > 0).any():
         return ""
     first, most = int(np.argmax(run.negative_modes > 0)), run.negative_modes.max()

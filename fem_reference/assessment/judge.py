@@ -52,7 +52,7 @@ class Verdict:
 
 
 def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> Word:
-    """Judge whether a ``value`` is at most ``within`` from the ``truth``, which is known up to its ``error_bar``; all in one unit.
+    """Judge whether a ``value`` is at most ``within`` from the ``truth``, known to within its ``error_bar``; all in one unit.
 
     The verdict is pass if ``abs(value - truth) <= within`` for every truth in the error bar, fail if this holds for no such truth,
     otherwise inconclusive. A value that is not a number fails. If the truth, the tolerance or the bar is unknown, the verdict is
@@ -83,7 +83,7 @@ def overall(words: Iterable[Word]) -> Word:
 
 
 def doubts(reference: Run) -> list[str]:
-    """Reasons to doubt a reference, in words: missing frames, instability, near inversion, laws out of range, energy gaps."""
+    """Reasons to doubt a reference, in words: missing frames, instability, a small det F, laws out of range, energy gaps."""
     said = [] if reference.outcome.status == "converged" else [str(reference.outcome.status)]
     modes = reference.scalars.get("negative_modes")
     unstable = 0 if modes is None else int((np.nan_to_num(modes) > 0).sum())

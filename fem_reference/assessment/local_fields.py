@@ -43,7 +43,9 @@ def to_bones(run: Run, context: MeasurementContext) -> Floats | None:
 
 
 def stretch_along(lines: Polylines, positions: Floats) -> Floats:
-    """The stretch (f, m) at the points of ``lines`` moved to ``positions`` (f, m, 3) [mm], of the two adjacent pieces together."""
+    """The stretch (f, m) of the two pieces adjacent to each point of ``lines``, taken together, with the points at ``positions``
+    (f, m, 3) [mm].
+    """
     count = len(lines.points)
     joined = np.ones(count - 1, bool)  # True where a piece joins a point to the next point
     joined[lines.offsets[1:-1] - 1] = False

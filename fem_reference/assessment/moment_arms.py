@@ -81,7 +81,7 @@ class ArmsBeside:
     ``found``: the range over the fibres at its angles (a,) [deg]. ``middle`` (a,) [mm]: the mean over the fibres. ``published``:
     the published range at the same angles; for a curve both ends are equal. ``kind``: the kind of the experiment. ``sense``: the
     direction of rotation for which moment arms are positive. ``setting``: the resolution of the run. ``coarser`` [mm]: the maximum
-    change of the mean moment arm over the poses with larger tetrahedra.
+    change, over the poses, that larger tetrahedra cause in the mean moment arm.
     """
 
     case: str

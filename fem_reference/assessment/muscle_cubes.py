@@ -44,7 +44,7 @@ class Quantity:
 
 
 def with_collagen(fibres: float, k1: float, k2: float) -> Material:
-    """The shipped matrix with ``collagen_across`` of ``k1`` [MPa] and ``k2``, and with fibres of the stress ``fibres`` [MPa]."""
+    """The shipped matrix with the effect ``collagen_across`` (``k1`` [MPa], ``k2``), and fibres with ``stress = fibres`` [MPa]."""
     passive = make("fibre_passive", **(FIBRES | {"stress": fibres}))
     return (*SHIPPED[:2], passive, make("collagen_across", k1=k1, k2=k2))
 
@@ -72,7 +72,9 @@ def stiffness_ratio(stretch: float) -> Callable[[Material], float]:
 
 
 def _extreme(material: Material, *, degrees: float, softest: bool) -> float:
-    """1 if the cube with fibres at ``degrees`` is the softest (or stiffest) of 0, 45 and 90 degrees by more than 1 %, else 0."""
+    """1 if, of cubes with fibres at 0, 45 and 90 degrees to the load, that at ``degrees`` is the softest (or the stiffest) by more
+    than 1 %, else 0.
+    """
     found = {angle: abs(stress(material, SQUEEZED, angle)) for angle in (0.0, 45.0, 90.0)}
     own = found.pop(degrees)
     clear = own < (1 - _CLEAR) * min(found.values()) if softest else own > (1 + _CLEAR) * max(found.values())

@@ -26,9 +26,9 @@ Displacement = Callable[[int], Floats | None]
 def between(problem: MusclesProblem, run: Run, nodes: Nodes, states: Displacement = lambda _: None) -> RunChecks:
     """Check that no muscle is inside another, if contact acts or was omitted because it is not needed.
 
-    The compliance of contact under its pressure and the bulge of facets are allowed. ``nodes``: the corners of the tetrahedra by
-    frame number; the check fails if they are not stored. ``states``: the displacement (m, 10, 3) [mm] by frame number. If it is
-    known and muscles press on each other, the curved facets are checked, each as 16 triangles.
+    Penetration due to the compliance of contact and the bulge of facets is allowed. ``nodes``: the positions of the corners of
+    the tetrahedra by frame number; the check fails if they are not stored. ``states``: the displacement (m, 10, 3) [mm] by frame
+    number. If it is known and muscles press on each other, the curved facets are checked, each as 16 triangles.
     """
     if not problem.apart:
         return ()
@@ -71,7 +71,7 @@ def _curved(mesh: TetMesh, displacement: Floats) -> Surface:
 
 
 def depths(runs: Mapping[str, Run]) -> Iterator[tuple[str, str, Floats]]:
-    """Both names and the depth of overlap (f,) [mm] for each pair of muscles in ``runs``; NaN where a position is not finite."""
+    """Both names and the depth of overlap (f,) [mm] for each pair of muscles in ``runs``; NaN in frames with unknown positions."""
     for one, other in combinations(runs, 2):
         found = list[float]()
         for a, b in zip(runs[one].positions, runs[other].positions, strict=True):

@@ -26,8 +26,8 @@ class Omission:
     ``left_out``: the names of the omitted effects or features: none, one, or all that can be omitted. ``status`` and ``message``:
     the outcome; a run that was not made has the status ``"refused"``. ``changes``: by ``metric.statistic``, the maximum magnitude
     over the frames of the change from the complete run; a statistic that is unknown in a frame is left out. ``costs``: as in the
-    run. ``instead``: settings that had to be changed because of the omission. ``predicted``: by ``metric.statistic``, the value of
-    an indicator, for omissions that have one.
+    run. ``instead``: settings that had to be changed because of the omission. ``predicted``: by ``metric.statistic``, the change
+    that an indicator predicts, for omissions that have one.
     """
 
     left_out: tuple[str, ...]
@@ -98,7 +98,8 @@ def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str
 
 
 def verdict(changes: Mapping[str, float], bars: Mapping[str, float]) -> Word:
-    """Judge an omission: it matters if one of its ``changes`` exceeds its error bar, and does not if all are below a tenth.
+    """Judge an omission: it matters if one of its ``changes`` exceeds its error bar, and does not if all are below a tenth of
+    theirs.
 
     >>> bars = {"volume.deviation": 0.1, "surface_deviation.rms": 1.0}
     >>> [verdict({"volume.deviation": 0.005, "surface_deviation.rms": x}, bars) for x in (0.05, 0.5, 5.0)]

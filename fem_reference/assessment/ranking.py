@@ -36,7 +36,7 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Ranking:
-    """The candidates ranked by one statistic (``places``), the smallest deviation first; its ``title`` and its ``unit``."""
+    """The candidates ranked by one statistic (``places``), the smallest deviation first; the statistic's ``title`` and ``unit``."""
 
     title: str
     unit: str

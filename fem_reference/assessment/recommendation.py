@@ -1,5 +1,5 @@
 """Recommendation of the cheapest or most accurate setting, as measured on the case itself or on the most similar cases; and the
-transfer of settings, with the size of tetrahedra scaled, to a case that is left out.
+transfer of settings, with the size of tetrahedra scaled, to a case that was left out when they were chosen.
 """
 
 import math
@@ -26,8 +26,8 @@ _COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
 
 @dataclass(frozen=True)
 class Expected:
-    """A setting with its expected ``error`` and ``time`` per frame [s]. ``of``: the cases on which it was measured. If this is the
-    case itself, ``bar`` is the known error bar of the truth, which is part of the error.
+    """A setting with its expected ``error`` and ``time`` per frame [s]. ``of``: the cases on which it was measured. If it was
+    measured on the case itself, ``bar`` is the known error bar of the truth, which is part of the error.
     """
 
     point: Point
@@ -49,7 +49,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Margins:
-    """Factors on the errors and times expected from the most similar cases; 1 if they were measured on the case itself."""
+    """Factors for errors and times that are expected from the most similar cases; 1 if they were measured on the case itself."""
 
     error: float = 1.0
     time: float = 1.0
@@ -59,8 +59,9 @@ class Margins:
 class Recommendation:
     """The recommended setting (``best``) out of ``count`` settings, with ``margins`` included; None if no setting meets the limits.
 
-    ``nearest``: in that case, the setting that exceeds the limits least. ``of``: the cases on which the settings were measured.
-    ``measured``: True if this is the case itself. ``loads``: by setting, the fraction of the machine that other processes used.
+    ``nearest``: if none meets them, the setting that exceeds them least. ``of``: the cases on which the settings were measured.
+    ``measured``: True if they were measured on the case itself. ``loads``: by setting, the fraction of the machine that other
+    processes used.
     """
 
     best: Expected | None
@@ -74,7 +75,7 @@ class Recommendation:
 
 @dataclass(frozen=True, eq=False)
 class KnownSettings:
-    """All ``settings`` for a case, with ``margins``, from the cases ``of``; ``measured``: True if this is the case itself."""
+    """All ``settings`` for a case, with ``margins``; ``of`` and ``measured`` as in :class:`Recommendation`."""
 
     settings: tuple[Expected, ...]
     margins: Margins
@@ -93,8 +94,8 @@ def recommend(
 
 
 def chosen(known: Sequence[Expected], limits: Mapping[str, float]) -> tuple[Expected | None, Expected | None]:
-    """The best setting within the ``limits``, None if there is none, and in that case the setting that exceeds the limits least.
-    With a limit ``"error"`` the cheapest setting is the best; with only a limit ``"time"`` [s] per frame, the most accurate.
+    """The best setting within the ``limits``, None if there is none; and, only if there is none, the setting that exceeds them
+    least. With a limit ``"error"`` the cheapest setting is the best; with only a limit ``"time"`` [s] per frame, the most accurate.
     """
     most = {"error": math.inf, "time": math.inf} | dict(limits)
     fitting = [one for one in known if one.error <= most["error"] and one.time <= most["time"]]
@@ -117,7 +118,7 @@ def known_settings(features: Features, case: str, studies: Sequence[CaseStudy], 
 
 
 def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> Sequence[CaseStudy]:
-    """The ``studies`` comparable with a case with these ``features``: lengths scale with the motion of bones, which must move."""
+    """The ``studies`` comparable with a case with these ``features``. Lengths scale with motion, so the bones must move."""
     if _is_share(metric):
         return studies
     if not features["motion"] > 0:
@@ -134,7 +135,7 @@ def _is_same(one: Features, other: Features) -> bool:
 
 
 def alike(features: Features, studies: Iterable[CaseStudy]) -> list[CaseStudy]:
-    """The studies of the cases most similar to a case with these ``features``, the most similar first. The measure is the sum of
+    """The studies of the cases most similar to a case with these ``features``, the most similar first. The distance is the sum of
     the absolute logarithms of the ratios of features; cases with and without contact are far apart.
     """
 
@@ -180,7 +181,7 @@ def _expected(features: Features, studies: Sequence[CaseStudy], metric: str, mar
 
 
 def scale(features: Features, other: Features, metric: str) -> float:
-    """The factor from an error on the ``other`` case to an error on this case. Lengths scale with motion; percentages do not."""
+    """The factor that turns an error on the ``other`` case into one on this case. Lengths scale with motion; percentages do not."""
     return 1.0 if _is_share(metric) else features["motion"] / other["motion"]
 
 
@@ -201,7 +202,7 @@ def _translated(point: Point, study: CaseStudy, features: Features) -> Point:
 
 
 def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
-    """Margins from leaving out each study in turn: the ratios of its measured values to those expected from the others."""
+    """Margins from leaving out each study in turn: quantiles of its measured values divided by those expected from the others."""
     errors, times = list[float](), list[float]()
     for study in studies:
         others = [other for other in studies if other is not study]
@@ -234,7 +235,7 @@ def is_elsewhere(point: Point) -> bool:
 
 
 def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
-    """The size of a point's tetrahedra relative to its case's, before refinement, and how many refinements fewer it has."""
+    """The size of a point's unrefined tetrahedra divided by its case's, and how many fewer refinements it has than its case."""
     scene = point.choice["scene"]
     size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
     return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]
@@ -248,8 +249,8 @@ def _settings(point: Point) -> str:
 @dataclass(frozen=True)
 class Transfer:
     """A setting of a ``solver`` that was ``chosen`` on all cases except ``left_out``, and then applied to that case. On that case,
-    ``error`` is its error, ``best`` the smallest error of all compared settings, and ``default`` the error of the default, NaN
-    without a default.
+    ``error`` is its error, ``best`` the smallest error of all compared settings, and ``default`` the error of the default
+    setting, NaN if there is none.
     """
 
     solver: str
@@ -267,7 +268,7 @@ class Transfer:
 
 def transfers(studies: Iterable[CaseStudy], error: str) -> tuple[Transfer, ...]:
     """For every solver and left-out case, the setting with the smallest mean logarithm of the error over the other cases, out of
-    those measured on every case. An error below the bar of a truth counts as this bar.
+    the settings measured on every case. An error below the bar of a truth counts as this bar.
     """
     by_solver: dict[str, dict[str, dict[str, float]]] = {}
     defaults: dict[tuple[str, str], float] = {}

@@ -66,7 +66,7 @@ class Judgement:
 
     @property
     def _direction(self) -> str:
-        """A statement in words whether a change is towards the reference or away from it."""
+        """The direction of a change, towards the reference or away from it, in words."""
         if self.question == "within" or self.name == MOVED or abs(self.current) == abs(self.was):
             return ""
         where = "nearer to" if abs(self.current) < abs(self.was) else "further from"
@@ -108,7 +108,7 @@ class Check:
 
 
 def check(baseline: Baseline, current: CurrentMeasures) -> Check:
-    """Judge ``current`` by a baseline of the same case, scene and candidate."""
+    """Judge ``current`` against a baseline of the same case, scene and candidate."""
     found = [_moved(baseline.positions, current)]
     for name, stored in baseline.measures.items():
         found += _of_statistic(name, stored, current)
@@ -141,7 +141,7 @@ def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
 
 def _of_statistic(name: str, stored: StoredStatistic, current: CurrentMeasures) -> Iterator[Judgement]:
     """Judge whether a statistic is unchanged since the baseline, which is exact up to rounding, and whether its distance from the
-    reference, which is known up to its error bar, is allowed.
+    reference, which is known to within its error bar, is allowed.
     """
     was, now, within = stored.numbers, current.values(name), math.nan if stored.within is None else stored.within
     rounding = np.full(len(was), 0.5 * 10.0 ** -PLACES[stored.unit])
@@ -167,7 +167,7 @@ def _judged(
 
 
 def _word(was: float, value: float, truth: float, bar: float, *, allowed: float) -> Word:
-    """The verdict on one frame: inconclusive without a number before and now, and fail if a number is new."""
+    """The verdict on one frame: inconclusive if both values are NaN, and fail if a number is new."""
     if math.isnan(was) and math.isnan(value):
         return "inconclusive"
     if math.isnan(truth):

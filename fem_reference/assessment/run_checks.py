@@ -1,4 +1,4 @@
-"""Checks of the states that a solver calls converged, from recorded positions and forces, independent of the solver's loop."""
+"""Checks of states that a solver calls converged, from recorded positions and forces, independent of the solver's iterations."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -26,13 +26,13 @@ from fem_reference.runs.store import Run
 
 # The accuracy of positions as a fraction of the size of the body; the rounding of stored values is a thousandth of this.
 ROUNDING = 1e-9
-# Exactly attached vertices may be off their position on the bone by this strain (a stretch of 4) times their distance from facets.
+# The error of exactly attached vertices may be this strain (a stretch of 4) times their distance from the attached facets.
 _STRAIN = 3.0
-# Safety factor on the mean extension of springs that follows from the recorded force, as springs pull at other points.
+# Safety factor on the mean extension of springs that follows from the recorded force, as springs do not pull at vertices.
 _SPRINGS = 1.5
 # The maximum rotation of a bone per load step, on average between two frames; beyond it the sense of rotation is unknown.
 _TURN = 1.01 * math.pi / 2
-# The penetration of a crease between contact points, as a fraction of the spacing; less than at a right-angled edge, ``BETWEEN``.
+# The penetration of a crease between contact points, as a fraction of the spacing; a right-angled edge has more (``BETWEEN``).
 _CREASE = 0.1
 # The penetration that self-contact of a part allows, for any recorded pressure, is less than this fraction of the spacing.
 _OWN = 0.5
@@ -75,7 +75,7 @@ Nodes = Callable[[int], Floats | None]
 
 
 def of_body(body: Body, solved: Run) -> RunChecks:
-    """Check that all states exist, are finite and agree with exact prescriptions, and that parts that may touch do not cross."""
+    """Check that all states exist, are finite and have the prescribed positions, and that parts that may touch do not cross."""
     numbers, points = tuple(state.number for state in solved.states), [state.points for state in solved.states]
     found = (_complete(body.frames, numbers), _finite(numbers, points))
     if not all(one.met for one in found):
@@ -98,7 +98,7 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch; smoothing, compliance, gaps between points and overlap remaining from rest are allowed."""
+    """Overlap of parts that may touch; overlap due to smoothing, compliance, gaps between points and the rest state is allowed."""
     for law in body.touching:
         edge, between, depth = longest_edge(body.mesh, law), unseen(body.mesh, law), partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
@@ -111,7 +111,7 @@ def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:
-    """Check that all frames exist in order and are finite, that attachments are at their bones, that load steps are small enough,
+    """Check that all frames exist in order and are finite, that attachments are on their bones, that load steps are small enough,
     that forces balance, and that the surface crosses neither a bone nor itself. ``nodes``: the points of the tetrahedra, if known.
     """
     fibres = [] if run.fibre_positions is None else [run.fibre_positions]
@@ -163,7 +163,8 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
 
 def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
     """The distance of exactly attached vertices from their positions on the bone: a strain times their distance from attached
-    facets is allowed. For springs, the mean extension: force (in situ, plus that at rest) over stiffness and area is allowed.
+    facets is allowed. For springs, the mean extension: the force (with ``in_situ``, plus that at rest) over stiffness and
+    area is allowed.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets = Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])
@@ -265,7 +266,7 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 
 
 def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
-    """The overlap of bone and muscle. Above ``give`` only the excess over rest counts; deep inside the bone it always fails."""
+    """The overlap of bone and muscle. Above ``give`` only the excess over rest counts; deep inside the bone the check fails."""
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:
@@ -281,14 +282,14 @@ def _at_rest(muscle: Surface, bone: Bone) -> Depths:
 
 
 def give(problem: MuscleProblem, bone: Bone, pressure: float, apart: float) -> float:
-    """The allowed penetration [mm] under a ``pressure`` [MPa], with contact points at a spacing of half of ``apart`` [mm]."""
+    """The allowed penetration [mm] under a ``pressure`` [MPa], with contact points at a spacing of ``apart / 2`` [mm]."""
     assert problem.contact is not None  # called only with contact
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
     return pressure / problem.contact.stiffness + known + BETWEEN * apart
 
 
 def _creases(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
-    """The self-penetration of the muscle's surface in excess of rest. The penetration that self-contact allows is accepted."""
+    """The self-penetration of the muscle's surface in excess of that at rest. Penetration that self-contact allows is accepted."""
     surface, law, none = run.surface, touching.among(problem.effects), np.zeros(len(run.numbers))
     pressure = np.nan_to_num(run.scalars.get("touching_pressure", none)) / (law.stiffness if law else np.inf)
     most = _OWN * (apart := spacing(surface))

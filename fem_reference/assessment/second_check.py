@@ -1,4 +1,4 @@
-"""The second check of states that a solver calls converged. A run that it denies has the status ``denied`` and is no truth."""
+"""The second check of states that a solver calls converged. A run that it denies has the status ``denied`` and is not a truth."""
 
 import hashlib
 import logging
@@ -90,7 +90,7 @@ def _displacement(run: Run, number: int) -> Floats | None:
 def confirmed_frames(
     problem: MuscleProblem | MusclesProblem, frames: Sequence[Frame], outcome: Outcome, settings: Record
 ) -> Outcome:
-    """The ``outcome`` of ``frames`` of muscles in memory, denied if it is converged and the second check is not passed."""
+    """The ``outcome`` of a run with its ``frames`` in memory, denied if it is converged and does not pass the second check."""
     if outcome.status != "converged":
         return outcome
     run = replace(collected(frames, outcome, problem.rest), origin={"settings": settings.model_dump(mode="json")})

@@ -1,4 +1,4 @@
-"""The kinds of solvers in Table 5.1 of the report, and the results of solvers of these kinds on scenes."""
+"""The kinds of solvers in Table 5.1 of the report DCSE/TR-2022-03, and the results of solvers of these kinds on scenes."""
 
 import tomllib
 from collections.abc import Mapping
@@ -119,7 +119,9 @@ class Overall:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """The ``results`` of solvers on ``scenarios``; ``missing``: by case, why it was left out; ``machines``: those of the runs."""
+    """The ``results`` of solvers on ``scenarios``; ``missing``: by case, why it was left out; ``machines``: the machines
+    of the runs.
+    """
 
     kinds: tuple[SolverKind, ...]
     scenarios: tuple[Scenario, ...]
@@ -141,7 +143,7 @@ class Table:
         return list(dict.fromkeys(one.name for one in self.results if one.kind == kind))
 
     def needs(self, kind: str, name: str) -> Mapping[str, int]:
-        """The number of parameters that ``name`` needs, by kind, on the scene that needs the most parameters; empty if unknown."""
+        """The number of parameters of each kind that ``name`` needs, on the scene that needs the most; empty if unknown."""
         found = [one.needs for one in self._by(kind, name)]
         return max(found, key=lambda needs: sum(needs.values()), default={})
 

@@ -22,11 +22,11 @@ MATCHED_ERROR, MATCHED_TIME = 2.0, 0.1
 class Standing(Record):
     """The result of the solver ``name`` of a ``group`` on a ``case``.
 
-    ``worst``: by ``metric.statistic``, the maximum deviation over the frames; empty for the reference, which has error ``bars``.
-    ``from_rest``: the rms distance [mm] of the last frame from the first, if the reference is back at rest in the last.
-    ``unsound``: the reason why the frames are unusable. ``split``: the root mean squares [mm] of the parts of the error.
-    ``least_error``: the error [mm] if the time is at most the matched time. ``least_time``: the time [s] if the error is at most
-    the matched error. ``truth`` and ``run``: the keys of the reference and of the run. ``frames``: a hash of the positions.
+    ``worst``: by ``metric.statistic``, the maximum deviation over the frames; empty for the reference, which has error ``bars``
+    instead. ``from_rest``: the rms distance [mm] between the surfaces in the first and last frame, if the reference is back at rest
+    then. ``unsound``: the reason why the frames are unusable. ``split``: the root mean squares [mm] of the parts of the error.
+    ``least_error``: the error [mm] if the time is at most ``MATCHED_TIME``. ``least_time``: the time [s] if the error is at most
+    ``MATCHED_ERROR``. ``truth`` and ``run``: the keys of the reference and of the run. ``frames``: a hash of the positions.
     ``stale``: True if case, reference, solver, protocol or time limit have changed since the ``date``. ``time_limit``: the allowed
     processor time [s].
     """

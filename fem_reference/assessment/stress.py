@@ -18,7 +18,9 @@ VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 
 class Bound(Record):
-    """A bound that a healthy run satisfies: a ``quantity`` of :mod:`health` is at most ``at_most`` in every or the last frame."""
+    """A bound that a healthy run satisfies: a ``quantity`` of :mod:`health` is at most ``at_most``, in every frame or, if
+    ``frame`` is "last", in the last frame.
+    """
 
     quantity: str
     at_most: float = Field(ge=0)
@@ -39,7 +41,7 @@ class History:
     points: Floats | None = None
 
     def worst(self, frame: Literal["any", "last"]) -> int:
-        """The index of the decisive frame, the last or that with the largest value; a value that is not a number is the largest."""
+        """The index of the decisive frame, the last or that with the largest value; NaN counts as the largest."""
         if frame == "last":
             return len(self.values) - 1
         return int(np.argmax(np.where(np.isnan(self.values), np.inf, self.values)))
@@ -89,7 +91,7 @@ class HardCase:
 
 @dataclass(frozen=True, eq=False)
 class Stress:
-    """All ``cells``, with the ``cases`` and the ``solvers`` in the order of the page. ``origin``: the provenance."""
+    """All ``cells``, with the ``cases`` and the ``solvers`` in the order in which pages show them. ``origin``: the provenance."""
 
     cases: tuple[HardCase, ...]
     solvers: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Records of uncertainty: the band of a case's results with unknown parameters, its sensitivities, and candidates in the band."""
+"""Records of uncertainty: bands of a case's results for uncertain parameters, sensitivities, and candidates compared with bands."""
 
 import math
 from dataclasses import dataclass, field
@@ -70,14 +70,15 @@ class Failure:
 class Band:
     """The band of a ``quantity`` over frame ``numbers`` (f,), in ``unit``.
 
-    ``low``, ``median`` and ``high`` (f,): the 5th, 50th and 95th percentile. ``nominal`` (f,): the result of the case. All are NaN
+    ``low``, ``median`` and ``high`` (f,): the 5th, 50th and 95th percentiles. ``nominal`` (f,): the result of the case. All are NaN
     in frames in which the quantity is not defined. ``bar`` (f,): the numerical error bar of the result of the case, None if it has
     none. ``distance``: True if the quantity is a distance from the result of the case; then values below the band are inside too.
 
     ``error``: the error of the surrogate at runs that were excluded from its fit, as a fraction of the variance; NaN without a
     surrogate. ``by``: the source of the percentiles, ``"process"`` (a Gaussian process) or ``"runs"``. ``refused``: the reason why
     there is no band. ``first`` and ``total``: by the key of a parameter, the fraction of the variance over all frames that is due
-    to it, alone and together with others; empty if the surrogate is not accurate enough, with the reason in ``unreliable``.
+    to it alone (``first``) or also together with others (``total``); empty if the surrogate is not accurate enough, with the reason
+    in ``unreliable``.
     """
 
     quantity: str

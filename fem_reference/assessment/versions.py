@@ -1,4 +1,4 @@
-"""Two versions of a solver: the statistics that have come nearer to the reference or gone farther away, with their frames."""
+"""Two versions of a solver: the statistics that are now nearer to the reference or farther from it, with their frames."""
 
 import math
 from collections.abc import Iterator
@@ -51,7 +51,7 @@ class Change:
 
     @property
     def by(self) -> float:
-        """The change in the frame :attr:`at`, positive if the distance increased; NaN without a number both earlier and now."""
+        """The change in the frame :attr:`at`, positive if the distance increased; NaN if both values are NaN."""
         return float(self.further[self.at])
 
     @property
@@ -130,7 +130,7 @@ class Versions:
 
     @property
     def place(self) -> tuple[int, int, float] | None:
-        """Frame index, vertex and distance [mm] of the largest motion; None if nothing moved."""
+        """Frame index, vertex and distance [mm] of the largest change of position; None if no position changed."""
         known = np.nan_to_num(self.moved, nan=-1.0)
         i, k = np.unravel_index(int(np.argmax(known)), known.shape)
         if known[i, k] <= POSITION_ROUNDING:

@@ -26,8 +26,8 @@ from fem_reference.io.texts import beside, check_size, is_file, parsed_xml
 # The maximum size in bytes of a mesh, a table or an index: a million triangles, which is more than our meshers and solvers can use.
 # The values of a text file need up to thirty times as much memory as the file.
 MOST_BYTES = 2**26
-# A half-written file that is older than this [s] is removed unless the process that writes it is running here. A newer file may be
-# in use by a process on another machine.
+# A half-written file that is older than this [s] is removed unless its process is still running on this machine. A newer file may
+# be in use by a process on another machine.
 _SETTLED = 10.0
 
 
@@ -61,8 +61,8 @@ def read_surface(path: Path, unit: float) -> Surface:
 def read_labelled(path: Path, unit: float, array: str, labels: Collection[int]) -> Surface:
     """The boundary of those tetrahedra in a VTU or MSH file whose value in an ``array`` of the cells is one of ``labels``.
 
-    For gmsh the array is ``gmsh:physical``. ``unit``: the unit of the coordinates in the file, in mm. Raises InputError if the file
-    lacks the array, or has none of the labels.
+    In files from gmsh the array is ``gmsh:physical``. ``unit``: the unit of the coordinates in the file, in mm. Raises InputError
+    if the file lacks the array, or has none of the labels.
     """
     want = (
         f'tetrahedra with an array "{array}" of integers, some of them {", ".join(map(str, labels))}, as .vtu or .msh'

@@ -18,7 +18,7 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 
-# The maximum size of a file in bytes. A case file has some kB, a baseline 1.3 kB per frame. In memory a file takes up to 30 times
+# The maximum size of a file in bytes. A case file has a few kB, a baseline 1.3 kB per frame. In memory a file takes up to 30 times
 # its size.
 MOST_TOML = 2**21
 MOST_JSON = 2**25

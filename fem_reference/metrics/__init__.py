@@ -118,9 +118,10 @@ class Worst:
 @dataclass(frozen=True, eq=False)
 class MeasurementContext:
     """The data that all measurements of a case share. ``areas`` (n,) [mm2]: the area around each vertex of the surface at rest.
-    ``fibres``: the fibres at rest. ``extension``: carries the displacement of a surface to the points of the fibres. ``travel``
-    [mm]: the maximum displacement of the reference's surface over all frames. ``bones``: the bones. ``exempt``: the part of the
-    surface that is exempt from contact. ``joints``: the joints. ``ends``: the ends of the fibres, None without attachments.
+    ``fibres``: the fibres at rest. ``extension``: the operator that carries the displacement of a surface to the points of the
+    fibres. ``travel`` [mm]: the maximum displacement of the reference's surface over all frames. ``bones``: the bones. ``exempt``:
+    the part of the surface that is exempt from contact. ``joints``: the joints. ``ends``: the ends of the fibres, None without
+    attachments.
     """
 
     areas: Floats
@@ -266,8 +267,8 @@ def at_rest(run: Run) -> Run:
 
 def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
     """All statistics of the change from rest of a ``run`` by the reference's solver, measured on the fibres of this run: if
-    overlaps with bones are removed first, the fibres of two runs differ at rest, and a surface would have to carry the fibres of
-    another run.
+    overlaps with bones are removed at the start, the fibres of two runs differ at rest, and otherwise a surface would have to carry
+    the fibres of another run.
     """
     own = context if run.fibres is None else replace(context, fibres=run.fibres)
     return measure(run, at_rest(run), own, wanted)
@@ -290,7 +291,7 @@ def rms(deviations: Floats, weights: Floats) -> Floats:
 
 
 def percentile(values: Floats, weights: Floats, share: float) -> float:
-    """The smallest of ``values`` (n,) up to which the weight is at least the fraction ``share``; NaN if any value is not finite."""
+    """The smallest of ``values`` (n,) up to which at least the fraction ``share`` of the weight lies; NaN unless all are finite."""
     if not np.isfinite(values).all():
         return float("nan")
     order = np.argsort(values)

@@ -1,6 +1,6 @@
 """Dihedral angles at the edges of a run's surface, compared with the reference.
 
-Relative to rest, the mean magnitude is the dihedral angle change of the report (eq. 5.23, Figs 6.18 to 6.20).
+Relative to rest, the mean magnitude is the dihedral angle change of the report DCSE/TR-2022-03 (eq. 5.23, Figs 6.18 to 6.20).
 """
 
 import numpy as np
@@ -28,8 +28,8 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
     ``mean``: the signed mean, positive if edges are more convex. ``rms``: the root mean square. ``mean_magnitude``, ``p95`` and
     ``max``: the mean, the 95th percentile and the maximum of the magnitude. An edge is weighted by the area around it at rest,
-    which is a third of its two triangles. In ``mean_magnitude_of_edges`` all edges have the same weight, as in the report. NaN in
-    frames in which a triangle has collapsed, because there is no angle then.
+    which is a third of the area of its two triangles. In ``mean_magnitude_of_edges`` all edges have the same weight, as in the
+    report. NaN in frames in which a triangle has collapsed, because there is no angle then.
     """
     edges = Edges.of(reference.surface)
     angles, wanted = (np.array([edges.angles(points) for points in each.positions]) for each in (run, reference))

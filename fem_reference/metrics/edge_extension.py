@@ -1,7 +1,7 @@
 """Lengths of the edges of the surface in a run, compared with the reference, in per cent of the rest length of each edge.
 
 If the surface is compared with the rest state instead, the values are l / L - 1 in per cent, where l is the length of an edge and L
-its length at rest. The report calls l / L the edge extension (Figs 6.15 to 6.17).
+its length at rest. The report DCSE/TR-2022-03 calls l / L the edge extension (Figs 6.15 to 6.17).
 """
 
 import numpy as np

@@ -2,8 +2,8 @@
 
 A moment is positive if it rotates the bone towards larger angles. The moment arm is the moment divided by the force. The axis is
 fixed in space. By virtual work, without dissipation, the moment is minus the derivative of the stored energy with respect to the
-angle. Lines of action pull at their ends, at via-points and at obstacles. The force is unknown for lines without ``hill`` and for
-most fast solvers.
+angle. Lines of action pull at their ends, at via-points and at obstacles. The force is unknown for lines without the Hill model
+(``hill``) and for most fast solvers.
 
 This moment arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with
 little force (docs/measures.md).

@@ -1,6 +1,6 @@
 """Stresses in the volume of a muscle, from solvers that compute them: means and quantiles over the volume at rest.
 
-The stresses are the Cauchy stress along the present fibres, the von Mises stress, and the pressure, which is positive in
+The stresses are the Cauchy stress along the deformed fibres, the von Mises stress, and the pressure, which is positive in
 compression, at four points of each tetrahedron. The maximum stress is not measured: at the rim of an attachment it grows without
 bound as the mesh is refined. Runs without stresses have no such measures.
 """

@@ -19,10 +19,10 @@ from fem_reference.io.soup import Soup
 class Format:
     """A mesh format, recognised by the ``suffixes`` of its files, which are in lower case and include the dot.
 
-    ``read``: returns points and triangles as they are in the file, and raises any exception if the file is incomplete. ``write``:
-    writes the surface and, if the format has point data, its displacement (n, 3) [mm]; None if the format can only be read.
-    ``shares_points``: True if triangles refer to a common list of points, whose order is kept; False if each triangle has three
-    points of its own. ``states_size``: True if a file states its size; otherwise truncation between two lines is not noticed.
+    ``read``: returns points and triangles as they are in the file, and raises an exception of any type if the file is incomplete.
+    ``write``: writes the surface and, if the format has point data, its displacement (n, 3) [mm]; None if the format can only be
+    read. ``shares_points``: True if triangles refer to a common list of points, whose order is kept; False if each triangle has
+    three points of its own. ``states_size``: True if a file states its size; otherwise truncation between two lines is not noticed.
     """
 
     suffixes: tuple[str, ...]
@@ -34,7 +34,7 @@ class Format:
 
 @cache
 def formats() -> dict[str, Format]:
-    """All formats by the suffix of their files. Raises TypeError if a module defines no format, or a suffix of another format."""
+    """All formats by the suffix of their files. Raises TypeError if a module defines no format, or a suffix already taken."""
     found: dict[str, Format] = {}
     for name in (name for name in modules.names(__path__) if not name.startswith("_")):
         one = vars(importlib.import_module(f"{__name__}.{name}")).get("FORMAT")

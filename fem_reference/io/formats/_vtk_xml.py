@@ -75,8 +75,8 @@ def _cells(piece: Element, name: str, arrays: "_Arrays", points: int) -> tuple[I
 
 
 class _Arrays:
-    """The arrays of a file with the given ``root`` element. ``appended``: the bytes that follow ``<AppendedData``, or none: the
-    rest of this tag and then, after the character ``_``, the data to which arrays refer.
+    """The arrays of a file with the given ``root`` element. ``appended``: the bytes that follow ``<AppendedData``, if any (the
+    rest of this tag and then, after the character ``_``, the data to which arrays refer).
     """
 
     def __init__(self, root: Element, appended: bytes) -> None:

@@ -12,7 +12,7 @@ from fem_reference.io.soup import Soup, only_triangles, rows
 
 _TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"}
 _TYPES |= {"float": "f4", "double": "f8"}
-_TYPES |= {np.dtype(code).name: code for code in _TYPES.values()}  # PLY also has numpy's names: int8 ... float64
+_TYPES |= {np.dtype(code).name: code for code in _TYPES.values()}  # PLY also allows numpy's names: int8 ... float64
 _CORNERS = ("vertex_indices", "vertex_index")
 
 

@@ -21,7 +21,7 @@ _WRITERS = {".vtk": "PolyDataWriter", ".vtp": "XMLPolyDataWriter", ".vtu": "XMLU
 
 @dataclass(frozen=True, eq=False)
 class DataBlock:
-    """A block of data: ``cells`` between ``points`` (n, 3) [mm], which are triangles (m, 3), tetrahedra (m, 4) or lines.
+    """A block of data: ``cells``, which are triangles (m, 3), tetrahedra (m, 4) or lines, between ``points`` (n, 3) [mm].
     ``of_points`` and ``of_cells``: arrays by name, (n, ...) and (m, ...). ``numbers``: by name, values for the entire block.
     """
 
