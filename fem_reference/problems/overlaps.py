@@ -81,7 +81,7 @@ def longest_edge(mesh: Cells, law: Touching) -> float:
 
 
 def unseen(mesh: Cells, law: Touching) -> float:
-    """The depth [mm] to which a right-angled edge can penetrate between contact points an eighth of the longest edge apart, as are 42
+    """The depth [mm] to which a right-angled edge can penetrate between contact points an eighth of the longest edge apart, as 42
     points on a facet. Between 16 points on a facet it can penetrate about twice as deep, but no more is allowed.
     """
     return BETWEEN * longest_edge(mesh, law) / 4
