@@ -13,8 +13,8 @@ _ROUNDS = 6
 # A vertex may move along an eigenvector of its normal tensor (see ``_normal_tensors``) if the eigenvalue is below this fraction of
 # the sum of all three; it then stays on its plane or sharp edge. Above 0.05, thin rims shrink; below 0.02, slivers remain.
 _FREE = 0.03
-# The distance of the pole of inversion, in diagonals of the body. A nearer pole displaces sharp edges; with a farther one, flat
-# parts are not curved enough.
+# The distance of the pole of inversion from the centre of the body, in diagonals of its bounding box. A nearer pole displaces sharp
+# edges; with a farther one, flat parts are not curved enough.
 _POLE = 6.0
 _NEARLY_FLAT = np.cos(np.radians(30))
 _TINY = np.finfo(float).tiny
@@ -121,7 +121,7 @@ def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> I
 
 
 def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
-    """Flip edges in the order of their gain, each triangle at most once; returns ``triangles`` itself if no edge is flipped."""
+    """Flip edges in order of decreasing gain, at most one per triangle; returns ``triangles`` itself if no edge is flipped."""
     edges = Edges.of(Surface(points, triangles))
     gain = _flip_gain(points, edges)
     if labels is not None:

@@ -11,7 +11,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal
 from fem_reference.foundations.rows import distinct
 from fem_reference.geometry.distance import distances
 
-# A point that is closer to the surface than this fraction of the surface's diagonal counts as on it.
+# A point that is closer to the surface than this fraction of the surface's diagonal counts as lying on it.
 _ON = 1e-10
 # If the sine of the angle between the plane of a triangle and the line of sight is below this, the triangle is seen edge-on, and
 # its solid angle counts as 0.
