@@ -2,7 +2,7 @@
 
 On the surface a path is a geodesic: a great circle of the sphere or a helix of the cylinder. Seen along the axis of rotation, each
 is an arc of a circle between two tangents, so one closed form holds for both (the "obstacles" of Garner and Pandy 2000, Comput.
-Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/10255840008915251; report 5.3).
+Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/10255840008915251; report DCSE/TR-2022-03, 5.3).
 """
 
 from dataclasses import dataclass
@@ -75,7 +75,7 @@ class Paths:
 
 def around(obstacle: Quadric, starts: Floats, ends: Floats) -> Paths:
     """Compute the shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along a great circle through both
-    points, or around a cylinder, along a helix. Points inside the obstacle are treated as on its surface.
+    points, or around a cylinder, along a helix. Points inside the obstacle are treated as lying on its surface.
     """
     middle = obstacle.pose[:3, 3]
     if np.isfinite(obstacle.radii[2]):
