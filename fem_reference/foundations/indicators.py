@@ -73,8 +73,8 @@ class Estimates:
     def bend(self, force: float) -> float:
         """Rms displacement [mm] of the muscle, bent as a Timoshenko beam with clamped ends by a ``force`` per volume [N/mm3]. The
         beam has the length, thickness and shear modulus of the muscle; its Young's modulus is three times its shear modulus. The
-        rms is 0.6 of the displacement at midspan, and a factor of 1/2 accounts for stretching. The result for
-        an unattached body is its length.
+        rms is 0.6 of the displacement at midspan, and a factor of 1/2 accounts for stretching. The result for an unattached
+        body is its length.
         """
         if not self.fixed:
             return self.length

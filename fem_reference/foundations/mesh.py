@@ -1,4 +1,4 @@
-"""Triangle surfaces, tetrahedral meshes and polylines: records, measurements, and checks that a surface is usable.
+"""Triangle surfaces, tetrahedral meshes and polylines: records, sizes, and checks that a surface is usable.
 
 Shapes of arrays: points ``(n, 3)`` [mm]; triangles ``(m, 3)`` and tets ``(k, 4)`` of point indices.
 """

@@ -16,7 +16,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BeforeValidator, TypeAdapter
 
 # The allowed units of coordinates (in files, in scenes, with frames and on the command line), and their lengths [mm]. A quantity
-# that is written with its unit may have any unit of its kind; for coordinates a slip such as "Mm", 1e9 mm, would go unnoticed.
+# that is written with its unit may have any unit of its kind, but for coordinates a slip such as "Mm", 1e9 mm, would go unnoticed.
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft": 304.8}
 
 

@@ -9,7 +9,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Edges of a closed surface. ``ends`` (e, 2): the first and the last vertex; ``beside`` (e, 2): the triangles to the left and
+    """Edges of a closed surface. ``ends`` (e, 2): the first and the second vertex; ``beside`` (e, 2): the triangles to the left and
     to the right of the edge, seen from outside; ``opposite`` (e, 2): the third vertices of these triangles; ``areas`` (e,) [mm2]: a
     third of the total area of both triangles.
     """

@@ -64,7 +64,7 @@ class Contours:
 
 
 def contours(field: FibreField, count: int, towards: Floats | None = None) -> Contours:
-    """Return up to ``count`` sections: the levels have equal numbers of tets between them, and sections with holes are left out.
+    """Return up to ``count`` sections, at levels with equal numbers of tets between them; sections with holes are left out.
 
     The x axis of the middle section's square is along ``towards`` (3,) or, if that is None, along the longest axis of the section.
     Positions on rims are transferred from section to section by matching points of neighbouring rims.

@@ -45,7 +45,7 @@ class FibreField:
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
         """Unit vectors (n, 3) along the fibres at rest ``points`` (n, 3); the ``cells`` have no influence."""
         found = self.directions(points)
-        flat = np.linalg.norm(found, axis=1) < 0.5  # zero gradient: all mesh points near it belong to one attachment
+        flat = np.linalg.norm(found, axis=1) < 0.5  # zero gradient: all nearby mesh points belong to one attachment
         if flat.any():
             mean = self.gradients.mean(axis=0)
             found[flat] = mean / np.linalg.norm(mean)

@@ -72,7 +72,7 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
     for facets, sign in ((mesh.facets[start], -1.0), (mesh.facets[end], 1.0)):
         areas = triangle_areas(mesh.points, facets)
         through[_numbers(triangles[first], facets)] += sign * areas / areas.sum()
-    potential = np.zeros(count)  # defined up to a constant, which is chosen so that this is 0 on the first face
+    potential = np.zeros(count)  # defined up to a constant; the first face has the value 0
     potential[1:] = splu(matrix[1:, 1:]).solve(through[1:])
     slopes = -3 * np.einsum("ki,kia->ka", potential[faces], rises)
     return Flow(mesh, mesh.facets[start], mesh.facets[end], faces, rises, slopes)

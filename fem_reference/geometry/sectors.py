@@ -22,8 +22,8 @@ def attached_shares(surface: Surface, vertices: Ints) -> Floats:
     """Attached share, 1 or 0, of each corner (m, 3) of the triangles of ``surface``, for the attached ``vertices`` (k,).
 
     If any triangle at a vertex is completely attached, then of the corners at this vertex only those in a sector with such a
-    triangle are attached, not those across a sharp edge. So the end of a muscle is attached, but not a
-    strip of the belly next to it, whose width would be arbitrary.
+    triangle are attached, not those across a sharp edge. So the end of a muscle is attached, but not a strip of the
+    belly next to it, whose width would be arbitrary.
     """
     attached = np.zeros(len(surface.points), bool)
     attached[vertices] = True

@@ -82,7 +82,7 @@ class Grid:
 
     @cached_property
     def half_thickness(self) -> float:
-        """An upper bound on the depth [mm], from the smallest coefficient; infinite if the nodes are too far apart for one."""
+        """An upper bound on the depth [mm], from the smallest coefficient; infinite if the nodes are too far apart to give one."""
         deepest = float(-self.coefficients.min())
         return deepest if deepest > self.spacing else np.inf
 
@@ -150,8 +150,7 @@ def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0
     (see ``check_closed``).
 
     ``rounding`` is the standard deviation s [mm] of a Gaussian filter of the distance, used because contact does not slide smoothly
-    over the edges between flat triangles. A surface with a mean curvature of 1/r moves inward by s^2/r; this shift is part of
-    the error.
+    over the edges between flat triangles. A surface with a mean curvature of 1/r moves inward by s^2/r; this is part of the error.
     """
     check_finite(surface)
     outward, _ = igl.bfs_orient(surface.triangles)

@@ -98,9 +98,9 @@ def straight(starts: Floats, ends: Floats) -> Paths:
 def _around(starts: Floats, ends: Floats, middle: Floats, axes: Floats, radius: float) -> Paths:
     """Compute paths that rotate from starts to ends, by at most half a turn, about ``axes`` (n, 3) through ``middle`` (3,).
 
-    Seen along the axis, two points at distances d1, d2 from it and at an angle t from each other are joined by tangents of the
-    lengths sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)). If the angle in brackets is not positive, the path is
-    straight. The displacement along the axis is distributed uniformly over this length: unrolled, the path is a straight line.
+    Seen along the axis, two points at distances d1, d2 from it and at an angle t from each other are joined by tangents of length
+    sqrt(d^2 - r^2) and an arc of length r (t - acos(r / d1) - acos(r / d2)). If the angle in brackets is not positive, the path
+    is straight. The displacement along the axis is uniform over the length of these: unrolled, the path is a straight line.
     """
     one, other = _across(starts - middle, axes), _across(ends - middle, axes)
     sines, cosines = np.sum(np.cross(one, other) * axes, axis=1), np.sum(one * other, axis=1)
