@@ -27,7 +27,7 @@ class Indicator:
 @dataclass(frozen=True)
 class Near:
     """Distance between the free surface and a bone. ``gap`` [mm]: the minimum clearance over all frames, guaranteed for any error
-    of the estimated motion. ``depth`` [mm]: the root mean square of the possible penetration of the surface, in the frame in which
+    in the estimated motion. ``depth`` [mm]: the root mean square of the possible penetration of the surface, in the frame in which
     it is largest. ``frame``: the number of the first frame in which the gap is smallest.
     """
 
@@ -73,8 +73,8 @@ class Estimates:
     def bend(self, force: float) -> float:
         """Rms displacement [mm] of the muscle, bent as a Timoshenko beam with clamped ends by a ``force`` per volume [N/mm3]. The
         beam has the length, thickness and shear modulus of the muscle; its Young's modulus is three times its shear modulus. The
-        rms is 0.6 of the displacement at midspan, and a factor of 1/2 accounts for stretching. An unattached body is displaced by
-        its length.
+        rms is 0.6 of the displacement at midspan, and a factor of 1/2 accounts for stretching. The result for an unattached
+        body is its length.
         """
         if not self.fixed:
             return self.length
@@ -87,7 +87,7 @@ class Estimates:
         return pull / self.shear * (self.length / self.thickness) ** 2 / 12
 
     def draw(self, force: float) -> float:
-        """Rms displacement [mm] of a clamped bar along its axis by a ``force`` per volume [N/mm3]: 2/3 of the maximum."""
+        """Rms displacement [mm] of a clamped bar along its axis under a ``force`` per volume [N/mm3]: 2/3 of the maximum."""
         return self.length**2 * force / (8 * 3 * self.shear) * 2 / 3 if self.fixed else self.length
 
     def lag(self, distance: float) -> float:
@@ -108,8 +108,8 @@ class Estimates:
         return 0.6 * self.sag * self.taut(pull) / (1 + self.taut(pull)) + self.shorten(pull, 0.3) * self.lean
 
     def shorten(self, pull: float, share: float) -> float:
-        """Rms displacement [mm] of the surface of a muscle that its fibres shorten with a ``pull`` [MPa]. ``share``: the upper
-        bound of the displacement, as a fraction of the length.
+        """Rms displacement [mm] of the surface of a muscle whose fibres shorten it with a ``pull`` [MPa]. ``share``: the upper
+        bound on the displacement, as a fraction of the length.
         """
         return share * self.length * pull / (pull + 3 * self.shear)
 

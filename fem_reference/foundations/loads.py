@@ -1,4 +1,4 @@
-"""Loads on a body: their amounts over time, their resultant forces and moments, and the integrals over the body that they need."""
+"""Loads on a body: their amounts over time, their resultant forces and moments, and the integrals over the body that these need."""
 
 from typing import NamedTuple, Protocol
 
@@ -39,7 +39,7 @@ class Shape(Protocol):
         """Current vector area (3,) [mm2] of a region, outward, and its moment (3,) [mm3] about the origin; None if unknown."""
 
     def motion(self) -> tuple[Floats, Floats] | None:
-        """Return the integral (3,) [mm4/s] of the velocity over the rest volume and its moment (3,) [mm5/s]; None if unknown."""
+        """Return integrals over the rest volume of the velocity (3,) [mm4/s] and of its moment (3,) [mm5/s]; None if unknown."""
 
 
 def dead(density: ArrayLike, shape: Shape, on: str | None = None) -> Wrench:

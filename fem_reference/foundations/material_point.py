@@ -1,4 +1,4 @@
-"""State at a point of a body, with the invariants and functions from which laws are written."""
+"""State at a point of a body, with the invariants and functions with which laws are written."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -109,7 +109,7 @@ class State:
         return self.J ** (-1 / 3) * self.functions.sqrt(self.square_stretch(self.fibre))
 
     def stretched(self, along: Any) -> Sequence[Sequence[Any]]:
-        """``F (l f f^T + l^(-1/2) (1 - f f^T))`` (3, 3): F after an isochoric stretch l, ``along``, of the fibre f."""
+        """``F (l f f^T + l^(-1/2) (1 - f f^T))`` (3, 3): F after an isochoric stretch l (``along``) of the fibre f."""
         across = 1 / self.functions.sqrt(along)
         ends = [sum(F * a for F, a in zip(row, self.fibre, strict=True)) for row in self.F]
         return [
@@ -125,7 +125,7 @@ class State:
 
 @dataclass(frozen=True)
 class FieldState:
-    """State of a scalar field at a point: ``value``, ``gradient`` (one entry per coordinate) and, if unknown, ``laplacian``."""
+    """State of a scalar field at a point. ``gradient`` has one entry per coordinate; a test function needs no ``laplacian``."""
 
     value: Any
     gradient: Sequence[Any]

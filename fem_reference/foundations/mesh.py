@@ -1,4 +1,4 @@
-"""Triangle surfaces, tetrahedral meshes and polylines: records, measurements, and checks that a surface is usable.
+"""Triangle surfaces, tetrahedral meshes and polylines: records, sizes, and checks that a surface is usable.
 
 Shapes of arrays: points ``(n, 3)`` [mm]; triangles ``(m, 3)`` and tets ``(k, 4)`` of point indices.
 """
@@ -158,14 +158,14 @@ def found_in(facets: Ints, others: Ints) -> Bools:
 
 
 def united(parts: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
-    """Join ``parts``, pairs of points and of cells that index these points, into the points (n, d) and cells (m, k) of one mesh."""
+    """Join ``parts``, each with points and cells that index these points, into the points (n, d) and cells (m, k) of one mesh."""
     starts = np.cumsum([0, *(len(points) for points, _ in parts)])
     cells = [own + start for (_, own), start in zip(parts, starts, strict=False)]
     return np.concatenate([points for points, _ in parts]), np.concatenate(cells)
 
 
 def check_finite(surface: Surface) -> None:
-    """Raise InputError for a surface without triangles, with points not finite or too far away, or with invalid triangles."""
+    """Raise InputError if a surface has no triangles, points that are not finite or too far away, or invalid triangles."""
     if len(surface.triangles) == 0:
         raise InputError(surface.place, "no triangles", "a triangle surface")
     bad = np.flatnonzero(~np.isfinite(surface.points).all(axis=1))
@@ -253,7 +253,8 @@ def _check_parts(surface: Surface) -> None:
 
 
 def enclosed_volume(points: Floats, triangles: Ints) -> float:
-    """Volume [mm3] inside a closed surface, by the divergence theorem about the mean of its points (report eq. 5.18, with its 1/6).
+    """Volume [mm3] inside a closed surface, by the divergence theorem about the mean of its points (eq. 5.18 of report
+    DCSE/TR-2022-03 with the factor 1/6, which the report omits in places).
 
     >>> tet = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> round(enclosed_volume(tet, TET_FACES), 12) == round(1 / 6, 12)

@@ -15,7 +15,7 @@ class RigidMotion:
     """Motion of a bone between keyframes ``frames``, by linear interpolation of ``amounts``.
 
     The bone rotates about the line through ``centre`` [mm] along ``axis`` by ``amounts`` [rad] or, without a centre, slides along
-    ``axis``, which may have any length, by ``amounts`` [mm]. It does not move before the first keyframe and after the last.
+    ``axis``, which may have any length, by ``amounts`` [mm]. It does not move before the first keyframe or after the last.
     Rotation is right-handed: a positive angle about +x takes +y to +z.
     """
 

@@ -19,8 +19,8 @@ def folders() -> list[str]:
 
 @cache
 def only_record(module: ModuleType, places: tuple[str, ...], kinds: tuple[type[Record], ...]) -> type[Record]:
-    """Return the only class in ``module`` that is a subclass of one of ``kinds``. Raises InputError if there are no or several such
-    classes, or if modules with this name are in several of the folders ``places``.
+    """Return the only class in ``module`` that is a subclass of one of ``kinds``. Raises InputError if there is not exactly one
+    such class, or if modules with this name are in several of the folders ``places``.
     """
     name = module.__name__.rpartition(".")[2]
     found = [place for place in places if (Path(place) / f"{name}.py").is_file()]

@@ -124,7 +124,7 @@ def parse[R](record: type[R], table: object, place: str) -> R:
 
 
 def _own(errors: Sequence[Any]) -> list[Any]:
-    """Leave out errors of lists that are too short only because some of their entries are wrong."""
+    """Leave out errors about lists that are too short only because some of their entries are wrong."""
     inside = {one["loc"][:i] for one in errors for i in range(len(one["loc"]))}
     return [one for one in errors if one["type"] != "too_short" or one["loc"] not in inside]
 

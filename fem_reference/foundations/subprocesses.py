@@ -38,7 +38,7 @@ def environment(**settings: str) -> dict[str, str]:
 
 
 def end_with_starter() -> None:
-    """End this process within about two seconds after the process that started it, directly or not, even if that one was killed."""
+    """End this process at most about two seconds after the end of its starter (direct or indirect), even if that was killed."""
     starter = os.environ.get(_STARTER)
     if starter is not None:
         threading.Thread(target=_watch, args=(int(starter),), daemon=True).start()

@@ -1,4 +1,4 @@
-"""Threads that work on several items at a time, each with a resource such as a process, and code that one thread runs at a time."""
+"""Threads that work on several items at a time, each with a resource such as a process, and code for one thread at a time."""
 
 import threading
 from collections.abc import Callable, Sequence
@@ -6,7 +6,7 @@ from concurrent.futures import FIRST_EXCEPTION, CancelledError, ThreadPoolExecut
 from contextlib import AbstractContextManager, ExitStack
 from queue import SimpleQueue
 
-# Cached files and warning filters are shared by the process, so functions that use them are run by one thread at a time.
+# All threads of the process share cached files and warning filters, so functions that use them are run by one thread at a time.
 _MAKING = threading.RLock()
 
 

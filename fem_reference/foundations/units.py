@@ -15,8 +15,8 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator, TypeAdapter
 
-# The allowed units [mm] of coordinates in files, in scenes, with frames and on the command line. A quantity that is written with
-# its unit may have any unit of its kind; for coordinates a slip such as "Mm", 1e9 mm, would go unnoticed.
+# The allowed units of coordinates (in files, in scenes, with frames and on the command line), and their lengths [mm]. A quantity
+# that is written with its unit may have any unit of its kind, but for coordinates a slip such as "Mm", 1e9 mm, would go unnoticed.
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft": 304.8}
 
 
@@ -41,7 +41,7 @@ COMMON: dict[tuple[str, str], float] = {
 _ONE_BY_ONE = threading.Lock()
 # A number, followed by an optional unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
-# Forbidden in a unit: an exponent that is not an integer of one or two digits, or that has itself an exponent, as in mm^9^9^9.
+# Forbidden in a unit: an exponent that is not an integer of one or two digits, or that itself has an exponent, as in mm^9^9^9.
 _NO_UNIT = re.compile(r"(?:\^|\*\*)(?!\s*[+-]?\d{1,2}(?![\w.])(?!\s*(?:\^|\*\*)))", re.ASCII)
 # The maximum number of characters in a quantity.
 _LONGEST = 100

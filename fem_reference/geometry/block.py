@@ -62,7 +62,7 @@ def _sheet(counts: Counts, axis: int, end: int) -> Ints:
 
 
 def _extent(surface: Surface) -> tuple[Floats, Floats]:
-    """Return the lowest and the highest corner (3,) of the axis-aligned box bounded by ``surface``; InputError if it is no box."""
+    """Return the lowest and the highest corner (3,) of the axis-aligned box bounded by ``surface``; InputError if there is none."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     near = _SAME * float((high - low).max())
     corners = surface.points[surface.triangles]

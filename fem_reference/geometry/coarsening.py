@@ -8,13 +8,13 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volum
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.edges import Edges
 
-# Chosen by trials on four hip muscles and a box; more rounds do not improve the result.
+# The number of rounds, chosen by trials on four hip muscles and a box; more rounds do not improve the result.
 _ROUNDS = 6
 # A vertex may move along an eigenvector of its normal tensor (see ``_normal_tensors``) if the eigenvalue is below this fraction of
 # the sum of all three; it then stays on its plane or sharp edge. Above 0.05, thin rims shrink; below 0.02, slivers remain.
 _FREE = 0.03
-# The distance of the pole of inversion, in diagonals of the body. A nearer pole displaces sharp edges; with a farther one, flat
-# parts are not curved enough.
+# The distance of the pole of inversion from the centre of the body, in diagonals of its bounding box. A nearer pole displaces sharp
+# edges; with a farther one, flat parts are not curved enough.
 _POLE = 6.0
 _NEARLY_FLAT = np.cos(np.radians(30))
 _TINY = np.finfo(float).tiny
@@ -24,8 +24,8 @@ def coarsen(surface: Surface, count: int) -> Surface:
     """Approximate a closed ``surface`` by one of about ``count`` triangles, with the same sharp edges and volume.
 
     Edges are first collapsed by quadric error (Garland and Heckbert 1997, doi 10.1145/258734.258849). In each of the following
-    rounds, edges are flipped towards a Delaunay triangulation, vertices slide towards the centre of their neighbours, and vertices
-    are then projected onto ``surface``.
+    rounds, edges are flipped towards a Delaunay triangulation, and vertices slide towards the centre of their neighbours and are
+    then projected onto ``surface``.
     """
     points, triangles = _collapse(surface, count)
     for _ in range(_ROUNDS):
@@ -87,7 +87,7 @@ def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> F
 
 
 def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
-    """Sum (n, 3, 3) of ``n n^T`` for the triangles around each point, with unit normals n, weighted by the angles at the point."""
+    """Sum (n, 3, 3) of ``u u^T`` over the triangles around each point, with unit normals u, weighted by the angles at the point."""
     across = unit_normals(points[triangles])
     squares = across[:, :, None] * across[:, None, :]
     tensors = np.zeros((len(points), 3, 3))
@@ -121,7 +121,7 @@ def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> I
 
 
 def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
-    """Flip edges in the order of their gain, each triangle at most once; returns ``triangles`` itself if no edge is flipped."""
+    """Flip edges in order of decreasing gain, at most one per triangle; returns ``triangles`` itself if no edge is flipped."""
     edges = Edges.of(Surface(points, triangles))
     gain = _flip_gain(points, edges)
     if labels is not None:
@@ -142,7 +142,7 @@ def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
 
 
 def _flip_gain(points: Floats, edges: Edges) -> Floats:
-    """Sum of the two angles opposite each edge, minus pi, (e,) [rad]; 0 if a flip would be useless or would bend the surface."""
+    """Sum (e,) [rad] of the two angles opposite each edge, minus pi; 0 if a flip would be useless or would bend the surface."""
     a, b, c, d = (points[corner] for corner in (*edges.ends.T, *edges.opposite.T))
     excess = _angle(a - c, b - c) + _angle(a - d, b - d) - np.pi
     before = _cosine(np.cross(b - a, c - a), np.cross(a - b, d - b))

@@ -1,4 +1,4 @@
-"""Cross-sections of a muscle on which a field has a given value (isosurfaces), as triangles, each mapped to the unit square.
+"""Triangulated cross-sections of a muscle on which a field has a given value (isosurfaces), each mapped to the unit square.
 
 The rims of consecutive sections are matched point by point, so that a changing outline does not twist lines along the muscle.
 """
@@ -20,7 +20,8 @@ _SHARES = (0, 1 / 8, 3 / 8, 5 / 8, 7 / 8, 1)
 _SQUARE = ((1, 1, 0, 0, 1, 1), (0.5, 1, 1, 0, 0, 0.5))
 _SAMPLES = 360  # the number of points on each rim that are matched
 _REACH = 60  # the maximum deviation of a match from the common shift of the rims, in samples
-_STEPS = (-1, 0, 1, 2, 3)  # possible differences between consecutive matches, in samples, so that matches stay in order
+# Possible changes of the shift between consecutive matches, in samples; with -2 or less, matches would not stay in order.
+_STEPS = (-1, 0, 1, 2, 3)
 # The distance between matched points that costs as much as stretching the rim to twice its length, divided by the rim's length.
 _STIFFNESS = 0.01
 _WINDOW = 9  # the number of samples in the moving mean that smooths the matches
@@ -104,7 +105,7 @@ def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection |
 
 
 def _cut(mesh: TetMesh, above: Floats) -> tuple[Ints, Floats]:
-    """Return the three cut edges (k, 3, 2) for each triangle in which a section cuts a tet, and vectors (k, 3) to larger values."""
+    """Return the cut edges (k, 3, 2) of each triangle in which a section cuts a tet, and a vector (k, 3) towards larger values."""
     order = np.take_along_axis(mesh.tets, np.argsort(above[mesh.tets], axis=1, kind="stable"), axis=1)
     below = (above[order] < 0).sum(axis=1)
     patterns = {
@@ -133,11 +134,11 @@ def _greatest(points: Floats, triangles: Ints) -> CrossSection | None:
 
 
 def carried(known: CrossSection, turns: Floats, other: CrossSection) -> Floats:
-    """Positions (m,) of the rim points of the ``other`` section along the unit square, transferred from the positions ``turns``
-    (n,) of the rim points of the ``known`` section.
+    """Positions (m,) of the rim points of the ``other`` section on the boundary of the unit square, transferred from the positions
+    ``turns`` (n,) of the rim points of the ``known`` section.
 
-    Points on the other rim are matched, in order, with points on the known rim. The matching minimises the mean square distance
-    between matched points, measured across the muscle, plus a penalty on stretch.
+    Points on the other rim are matched, in order, with points on the known rim. The matching minimises the mean square of the
+    distance, across the muscle, between matched points, plus a penalty on stretch.
     """
     normal = known.normal + other.normal
     normal /= max(float(np.linalg.norm(normal)), 1e-12)

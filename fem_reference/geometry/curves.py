@@ -1,4 +1,4 @@
-"""Curves through a few points: the estimation techniques of the report's sections 3.1 to 3.5, for fibres and outlines.
+"""Curves through a few points: the estimation techniques of report DCSE/TR-2022-03, 3.1 to 3.5, for fibres and outlines.
 
 A curve is a callable that maps parameters (m,), 0 at its first point and 1 at its last, to points (m, d). Two formulas of the
 report have misprints. The second row of the Bezier matrix (3.1) must be -3, 3, 0, 0. The matrix (3.2) belongs to the uniform

@@ -1,4 +1,4 @@
-"""Exact unsigned distance from points to a triangle surface, winding numbers of closed surfaces, and sets of distant points."""
+"""Exact unsigned distance from points to a triangle surface, winding numbers of closed surfaces, and sets of points far apart."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from fem_reference.geometry.near_pairs import reached
 
 # The distance from a triangle to the sample point just outside it, as a fraction of the surface's diagonal.
 _STEP = 1e-5
-# The number of triangles within another part whose depth is measured: those farthest from the uncovered triangles.
+# The number of triangles whose depth within another part is computed: those farthest from the triangles outside all other parts.
 _WITHIN = 16
 
 

@@ -9,8 +9,8 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Edges of a closed surface. ``ends`` (e, 2): the vertices, in the direction of the left triangle seen from outside; ``beside``
-    (e, 2): the left and the right triangle; ``opposite`` (e, 2): the third vertices of these triangles; ``areas`` (e,) [mm2]: a
+    """Edges of a closed surface. ``ends`` (e, 2): the first and the second vertex; ``beside`` (e, 2): the triangles to the left and
+    to the right of the edge, seen from outside; ``opposite`` (e, 2): the third vertices of these triangles; ``areas`` (e,) [mm2]: a
     third of the total area of both triangles.
     """
 
@@ -39,7 +39,7 @@ class Edges:
 
         The angle is 0 if the triangles are coplanar, pi / 2 at the edges of a box, negative at a concave edge, and NaN if a
         triangle has no normal. It equals atan2((n x m) . d, n . m) with the unit normals n, m and the direction d of the edge:
-        report eq. 5.23 without its arccos, which loses the sign and, for small angles, digits.
+        eq. 5.23 of report DCSE/TR-2022-03 without its arccos, which loses the sign and, for small angles, digits.
         """
         start, end = (points[corner] for corner in self.ends.T)
         along = end - start

@@ -9,7 +9,7 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, diagonal, edge_vectors
 from fem_reference.geometry.distance import Distances, distances
 
-# A point that is found in no tet because of rounding is searched again at this distance, as a fraction of the mesh's diagonal.
+# A point that is found in no tet because of rounding is displaced by this fraction of the mesh's diagonal and looked up again.
 _NUDGE = 1e-9
 # A closest point with a barycentric coordinate below this value is considered to be on the opposite edge, or at a corner.
 _TIE = 1e-9
@@ -59,7 +59,7 @@ class Locator:
         return Embedding(tets, barycentric(points, self.mesh.points[self.mesh.tets[tets]]), outside)
 
     def _first_of_ties(self, skin: Distances) -> Ints:
-        """Closest boundary triangles (n,). At an edge or corner, the first of the equally close ones, independent of rounding."""
+        """Closest boundary triangles (n,); at an edge or corner the first of those around it, so that rounding has no influence."""
         chosen, inner = np.array(skin.triangle), skin.barycentric
         for i in np.flatnonzero((inner < _TIE).any(axis=1)):
             chosen[i] = self._firsts[frozenset(self.faces[chosen[i]][inner[i] >= _TIE].tolist())]

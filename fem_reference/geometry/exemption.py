@@ -44,7 +44,7 @@ class Exemption:
     ``part`` (r, 3, 3) [mm]: corners of the triangles of the attached part. ``by`` (r,): index of the attachment to which each of
     these triangles belongs. ``names``: for each attachment, the name of its bone.
 
-    The reach equals the ``spacing`` of contact points. If a contact point were less than this distance from the attached part, the
+    The reach equals the spacing of contact points. If a contact point were less than this distance from the attached part, the
     area that belongs to the point would include attached area. The reach depends on the size of the surface and not on its
     triangulation.
     """

@@ -11,7 +11,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal
 from fem_reference.foundations.rows import distinct
 from fem_reference.geometry.distance import distances
 
-# A point that is closer to the surface than this fraction of the surface's diagonal counts as on it.
+# A point that is closer to the surface than this fraction of the surface's diagonal counts as lying on it.
 _ON = 1e-10
 # If the sine of the angle between the plane of a triangle and the line of sight is below this, the triangle is seen edge-on, and
 # its solid angle counts as 0.
@@ -21,7 +21,7 @@ _EDGE_ON = 1e-10
 @dataclass(frozen=True, eq=False)
 class Extension:
     """Extension of displacement from a surface to ``points`` (m, 3) [mm]. ``rest`` (n, 3) [mm]: the points of the surface at rest;
-    ``weights`` (m, n): the weights of the surface's displacements, with the sum 1 in each row.
+    ``weights`` (m, n): the weights of the surface's displacements, which add up to 1 in each row.
 
     The extension is exact for affine motion of the surface. On the surface it equals linear interpolation in the triangle.
     """

@@ -1,8 +1,9 @@
-"""Fibres of a template in the unit cube, mapped to sections of a muscle: the decomposition of Kohout and Kukacka (report 6.1.2).
+"""Fibres of a template in the unit cube, mapped to sections of a muscle: the decomposition of Kohout and Kukacka.
 
-Their method uses isocontours on the surface. Here each contour is the rim of a section of a Laplace field in tetrahedra, and points
-inside come from a harmonic map of that section. These points are in the muscle; between sections, lines may leave it where it
-bends. If a muscle has several heads, only the largest section is followed; where a head begins or ends, lines are twisted.
+Their method (report DCSE/TR-2022-03, 6.1.2) uses isocontours on the surface. Here each contour is the rim of a section on which a
+Laplace field in tetrahedra is constant, and points inside come from a harmonic map of that section. These points are in the muscle;
+between sections, lines may leave it where it bends. If a muscle has several heads, only the largest section is followed; where a
+head begins or ends, lines are twisted.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from fem_reference.geometry.radial_basis import halton
 
 PLACE = "fibres.kohout_kukacka"
 _WINDOW = 7  # the number of consecutive points of a line to which smoothing fits a parabola
-_FLAT = 1e-9  # twice the area in the unit square below which the corners of a triangle count as collinear
+_FLAT = 1e-9  # twice the area, in the unit square, below which the corners of a triangle count as collinear
 _SHORTEST = 0.1  # the minimum length of a pennate fibre along the muscle, as a fraction of that of the longest fibre
 
 
@@ -63,10 +64,10 @@ class Contours:
 
 
 def contours(field: FibreField, count: int, towards: Floats | None = None) -> Contours:
-    """Return ``count`` sections between the attachments, with about equal volumes between them; sections with holes are left out.
+    """Return up to ``count`` sections, at levels with equal numbers of tets between them; sections with holes are left out.
 
     The x axis of the middle section's square is along ``towards`` (3,) or, if that is None, along the longest axis of the section.
-    The squares are passed on from section to section by matching nearest points of neighbouring rims.
+    Positions on rims are transferred from section to section by matching points of neighbouring rims.
     """
     means = field.values[field.mesh.tets].mean(axis=1)
     levels = np.quantile(means, (np.arange(count) + 0.5) / count)

@@ -28,8 +28,8 @@ Directions = Callable[[Ints, Floats], Floats]
 
 @dataclass(frozen=True, eq=False)
 class FibreField:
-    """A Laplace field between two attachments. ``values`` (n,), ``gradients`` (n, 3): the field at the points of its own ``mesh``;
-    ``start``, ``end`` (m, 3): the triangles of the attachments, on which the field is 0 and 1.
+    """A Laplace field between two attachments. ``values`` (n,), ``gradients`` (n, 3): the field and its gradient at the points of
+    its own ``mesh``; ``start``, ``end`` (m, 3): the triangles of the attachments, on which the field is 0 and 1.
     """
 
     mesh: TetMesh
@@ -45,7 +45,7 @@ class FibreField:
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
         """Unit vectors (n, 3) along the fibres at rest ``points`` (n, 3); the ``cells`` have no influence."""
         found = self.directions(points)
-        flat = np.linalg.norm(found, axis=1) < 0.5  # zero gradient: all mesh points around belong to one attachment
+        flat = np.linalg.norm(found, axis=1) < 0.5  # zero gradient: all nearby mesh points belong to one attachment
         if flat.any():
             mean = self.gradients.mean(axis=0)
             found[flat] = mean / np.linalg.norm(mean)
@@ -67,8 +67,8 @@ class FibreField:
         return self.sampled(points)[0]
 
     def sampled(self, points: Floats) -> tuple[Floats, Bools]:
-        """Unit vectors (m, 3) of steepest ascent at ``points`` (m, 3), and a mask (m,) of the points in the mesh and not on
-        an attachment.
+        """Unit vectors (m, 3) of steepest ascent at ``points`` (m, 3), and a mask (m,) of the points that are in the mesh but
+        not on an attachment.
         """
         embedding = self.locator.embed(points)
         ascent, values = (embedding.interpolate(self.mesh, one) for one in (self.gradients, self.values))
@@ -163,7 +163,9 @@ def averaged(mesh: TetMesh, slopes: Floats) -> Floats:
 
 
 def _seeds(field: FibreField) -> Floats:
-    """Points (k, 3) off the skin at which the field is 1/2: the centre of each cut of a tet, and points halfway to its corners."""
+    """Points (k, 3) off the skin at which the field is 1/2: the centre of each cut of a tet, and points halfway to the corners
+    of the cut.
+    """
     mesh = field.mesh
     ends = mesh.tets[:, EDGES]
     low, high = (field.values[ends[:, :, side]] - _HALFWAY for side in range(2))

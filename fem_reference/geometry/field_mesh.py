@@ -1,4 +1,4 @@
-"""Meshes of scalar fields: intervals and triangles, in the plane or in space, with their sizes, boundary and refinement.
+"""Meshes for scalar fields: intervals and triangles, in the plane or in space, with their sizes, boundary and refinement.
 
 Shapes of arrays: points ``(n, d)`` with d from 1 to 3; cells ``(m, 2)`` of an interval (d = 1) or ``(m, 3)`` of triangles.
 """
@@ -127,7 +127,7 @@ def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: in
 
 
 def refined(mesh: FieldMesh) -> FieldMesh:
-    """Cut intervals in two, or triangles in four, at edge midpoints. Vertex i keeps its index; edge j becomes vertex n + j."""
+    """Cut intervals in two, or triangles in four, at edge midpoints. Vertex i keeps its index; vertex n + j halves edge j."""
     cells: list[tuple[Ints, ...]]
     if mesh.cells.shape[1] == 2:
         a, b, ab = nodes(mesh, 2).T

@@ -26,7 +26,7 @@ from fem_reference.foundations.mesh import (
 from fem_reference.geometry.fibres import POINTS, FibreField, averaged, resample, spread
 
 MOST = 1000  # the maximum number of fibres
-_LINES, _LINES_EACH = 1000, 8  # the minimum number of lines in total and per fibre; fibres are chosen among them
+_LINES, _LINES_EACH = 1000, 8  # the minimum numbers of lines, in total and per fibre, from which fibres are chosen
 _ROUNDS = 50  # the maximum number of iterations of Lloyd's algorithm, which converges in fewer
 _PLASTIC = 1.324717957244746  # x^3 = x + 1: its powers spread points evenly (Roberts 2018, the R2 sequence)
 
@@ -47,7 +47,7 @@ class Flow:
 
     @property
     def field(self) -> FibreField:
-        """Directions of the flow as a continuous field: at each point, the volume average over the tetrahedra around it."""
+        """Directions of the flow as a continuous field: at a mesh point, the volume-weighted mean over the tetrahedra around it."""
         no_values = np.full(len(self.mesh.points), np.nan)  # the potential is not constant on attachments
         return FibreField(self.mesh, no_values, averaged(self.mesh, self.slopes), self.start, self.end)
 
@@ -57,7 +57,7 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
     the boundary. It is the gradient of a potential u with ``-laplace u = 0`` and ``du/dn = -1/A_start``, ``1/A_end`` or 0.
 
     The elements are of the Crouzeix-Raviart type. Their gradients are lowest-order Raviart-Thomas fields, so the flux out of a
-    tetrahedron equals the flux into the next exactly (Marini 1985, SIAM J. Numer. Anal. 22:493).
+    tetrahedron exactly equals the flux into the next (Marini 1985, SIAM J. Numer. Anal. 22:493).
     """
     triangles = _triangles(mesh)
     _, first, numbers = np.unique(triangles, axis=0, return_index=True, return_inverse=True)
@@ -72,14 +72,14 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
     for facets, sign in ((mesh.facets[start], -1.0), (mesh.facets[end], 1.0)):
         areas = triangle_areas(mesh.points, facets)
         through[_numbers(triangles[first], facets)] += sign * areas / areas.sum()
-    potential = np.zeros(count)  # defined up to a constant, chosen as 0 on the first face
+    potential = np.zeros(count)  # defined up to a constant; the first face has the value 0
     potential[1:] = splu(matrix[1:, 1:]).solve(through[1:])
     slopes = -3 * np.einsum("ki,kia->ka", potential[faces], rises)
     return Flow(mesh, mesh.facets[start], mesh.facets[end], faces, rises, slopes)
 
 
 def streamlines(flux: Flow, count: int) -> Polylines:
-    """Compute ``count`` lines of 40 points along ``flux``, each for an equal area of both attachments; InputError for too few.
+    """Compute ``count`` lines of 40 points along ``flux``, each for equal areas of both attachments; InputError if too many.
 
     More lines are started evenly over the area and grouped so that the groups are compact at both ends (Lloyd 1982), with distances
     in units of the size of each attachment. The central line of each group is returned.
@@ -122,7 +122,7 @@ def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:
 
 
 def _followed(flux: Flow, tets: Ints, points: Floats) -> list[Floats]:
-    """Lines (n, 3) from ``points`` (k, 3) in ``tets`` (k,) that leave through the end of the flow, straight inside each tet."""
+    """Lines (n, 3) from ``points`` (k, 3) in ``tets`` (k,), straight in each tet; only those that reach the end of the flow."""
     beyond, going, met = _neighbours(flux.faces), np.arange(len(points)), np.full(len(points), -1)
     passed, arrives, ends = [(going, points)], np.zeros(len(points), bool), _numbers(_triangles(flux.mesh), flux.end)
     for _ in range(len(flux.mesh.tets)):  # a line passes through each tetrahedron at most once

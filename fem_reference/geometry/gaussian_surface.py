@@ -1,4 +1,4 @@
-"""Closed surfaces as level sets of a sum of Gaussians (report 7.1; Carr et al. 2001, doi 10.1145/383259.383266)."""
+"""Closed surfaces as level sets of a sum of Gaussians (report DCSE/TR-2022-03, 7.1; Carr et al. 2001, 10.1145/383259.383266)."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,10 @@ from fem_reference.geometry.distance import farthest_points
 
 # The number of points inside the surface from which the initial centres are chosen, and the number of vertices used in the fit.
 _INSIDE, _SAMPLES = 20_000, 1500
-# The distance from the surface of the samples on both sides of it, relative to the edge of a cube with the volume of the surface.
+# The distance from the surface to the samples on both sides of it, relative to the edge of a cube with the volume of the surface.
 _BESIDE = 0.05
-# The number of rounds of the fit, each of which uses the gradients of the level at the samples from the previous round, and the
-# number of evaluations in each round.
+# The number of rounds of the fit, and the maximum number of evaluations in each round. Each round uses the gradients of the
+# level at the samples when the round begins.
 _ROUNDS, _STEPS = 6, 8
 # The minimum and the maximum radius of a Gaussian, relative to the edge of a cube with the volume of the surface.
 _RADII = (0.02, 2.0)

@@ -6,13 +6,13 @@ from fem_reference.foundations.mesh import Floats, Surface, TetMesh, boundary
 from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.intersections import crossings
 
-# Sample points of a triangle that crosses the other surface, in barycentric coordinates: a regular grid with the corners.
+# Sample points of a triangle that crosses the other surface, in barycentric coordinates: a regular grid that includes the corners.
 _GRID = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6
 
 
 def penetration(one: Surface, other: Surface) -> tuple[float, Floats]:
-    """Return the depth [mm] to which two closed surfaces penetrate each other, 0 if they are apart, and the point (3,) of that
-    depth. It is the maximum over all vertices and over 28 sample points on each triangle that crosses the other surface.
+    """Return the depth [mm] to which two closed surfaces penetrate each other, 0 if they are apart, and the point (3,) with that
+    depth, the deepest of all vertices and of 28 sample points on each triangle that crosses the other surface.
     """
     pairs = crossings(one, other)
     depths, places = [np.zeros(1)], [one.points[:1]]

@@ -10,7 +10,7 @@ from fem_reference.geometry.near_pairs import near_pairs
 
 
 def self_intersections(surface: Surface) -> Ints:
-    """Sorted indices (k,) of the triangles that intersect another triangle, that is, an edge of one pierces the other."""
+    """Sorted indices (k,) of the triangles that intersect another one: an edge of one of the two pierces the other."""
     return np.unique(self_crossings(surface))
 
 

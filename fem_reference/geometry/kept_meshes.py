@@ -1,4 +1,4 @@
-"""Disk cache for tetrahedra and other arrays that take long to compute. Files are written atomically and replaced if damaged."""
+"""Disk cache for tetrahedra and other arrays that are slow to compute. Files are written atomically and replaced if damaged."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -80,7 +80,7 @@ def _read[T](path: Path, of_arrays: Callable[[Arrays], T]) -> T | None:
 
 
 def _write(path: Path, arrays: Arrays) -> None:
-    """Store arrays, safely if several processes do so at the same time; log a warning if the file cannot be written."""
+    """Store arrays, safely even if several processes do so at the same time; log a warning if the file cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with files.whole(path) as part:

@@ -1,4 +1,4 @@
-"""Pairs of triangles that may intersect, triangles near points, and connected parts, by compiled code (``near_pairs.c``)."""
+"""Pairs of triangles that may intersect, triangles near points, and connected parts, found by compiled code (``near_pairs.c``)."""
 
 import ctypes
 from functools import cache, lru_cache
@@ -12,7 +12,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_part
 from fem_reference.geometry.boxes import within
 
 # No -ffast-math: it reorders sums, and the bounds on their rounding errors would not hold. No vectorisation of straight-line code:
-# gathering three coordinates into a vector takes longer than it saves.
+# gathering three coordinates into a vector costs more time than it saves.
 _FLAGS = ("-O3", "-march=native", "-fno-tree-slp-vectorize")
 _ROOM = 1000
 _FARTHEST = 1e307  # [mm]
@@ -40,16 +40,16 @@ class _Sorted:
             self.code.forget(self.grid)
 
 
-# Pairs with a bone are searched in many frames, always in the bone's coordinates, so the bone's sorted triangles are cached.
+# Pairs with a bone are searched for in many frames, always in the bone's coordinates, so the bone's sorted triangles are cached.
 _kept = lru_cache(maxsize=8)(_Sorted)
 
 
 def near_pairs(one: Surface, other: Surface) -> Ints | None:
     """Find pairs (k, 2) of triangles of two surfaces, or of one surface with itself, that may intersect or touch. Each pair that
-    does is found once, along with few that do not. Triangles of one surface that share an edge or touch only at a corner are left
-    out.
+    does is found once, along with a few that do not. Triangles of one surface are left out if they share an edge or touch only
+    at a shared corner.
 
-    Returns None without a compiler, or if a point is not finite or very far away. Repeated calls with one ``other`` are faster.
+    Returns None without a compiler, or if a point is not finite or very far away. Further calls with the same ``other`` are faster.
     """
     code = _code()
     if code is None or not _moderate(one.points, other.points):

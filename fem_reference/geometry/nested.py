@@ -1,4 +1,4 @@
-"""Refinement of each tetrahedron into eight: nested, graded towards rims, with boundary points moved onto the filled surface."""
+"""Refinement of each tetrahedron into eight: nested, graded towards rims, with boundary points moved onto a given surface."""
 
 import numpy as np
 
@@ -89,8 +89,8 @@ def _eighths(points: Floats, nodes: Ints) -> Ints:
 
 
 def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
-    """Four parts (4 m, 3) of each of ``faces`` (m, 3), with the same orientation. ``keys``: the sorted keys of the edges, on which
-    new points are numbered from ``count`` on.
+    """Four parts (4 m, 3) of each of ``faces`` (m, 3), with the same orientation. ``keys``: the sorted keys of the edges; the
+    new points on them are numbered from ``count`` on.
     """
     if len(faces) == 0:
         return faces

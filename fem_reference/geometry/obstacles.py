@@ -1,4 +1,4 @@
-"""Smooth obstacles of paths: quadrics (ellipsoids and cylinders) and tori, with level functions and their first two derivatives."""
+"""Smooth obstacles for paths: quadrics (ellipsoids and cylinders) and tori; level functions and their first two derivatives."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -56,7 +56,7 @@ class Quadric:
         return np.asarray(2 * np.vecdot(own, own))
 
     def curving(self, points: Floats, directions: Floats) -> Floats:
-        """Second derivatives (n, 3) by arc length of the geodesics through ``points`` (n, 3) along ``directions`` (n, 3)."""
+        """Curvature vectors (n, 3) [1/mm] of the geodesics through ``points`` (n, 3) along ``directions`` (n, 3)."""
         slope = (points - self.pose[:3, 3]) @ self._form
         return np.asarray((-np.vecdot(directions @ self._form, directions) / np.vecdot(slope, slope))[:, None] * slope)
 
@@ -67,7 +67,7 @@ class Quadric:
         return np.asarray(turn @ turn.T)
 
     def pushed(self, points: Floats) -> Floats:
-        """Move ``points`` (n, 3) that are inside to the surface along its normal; points near the axis are first moved off it."""
+        """Move inner ``points`` (n, 3) to the surface along its normal; points at the centre or axis are first moved off it."""
         own, thin = self._own(points), int(np.argmin(self.radii))
         own[np.sum((own / self.radii) ** 2, axis=1) < _MIDDLE**2, thin] = _MIDDLE * self.radii[thin]
         size = np.sqrt(np.sum((own / self.radii) ** 2, axis=1))
@@ -119,7 +119,7 @@ class Ring:
         return self._bending(directions, *self._outward(points))
 
     def curving(self, points: Floats, directions: Floats) -> Floats:
-        """Second derivatives (n, 3) by arc length of the geodesics through ``points`` (n, 3) along ``directions`` (n, 3)."""
+        """Curvature vectors (n, 3) [1/mm] of the geodesics through ``points`` (n, 3) along ``directions`` (n, 3)."""
         outward, away = self._outward(points)
         slope = 2 * (points - self.pose[:3, 3] - self.radius * outward)
         bending = self._bending(directions, outward, away)
@@ -139,7 +139,7 @@ class Ring:
         return np.asarray(middle + across * np.maximum(self.tube / size, 1.0))
 
     def through(self, starts: Floats, ends: Floats) -> Floats:
-        """Points (n, 3) in the hole, nearest to where straight paths cross its plane; the midpoints of paths that do not cross."""
+        """Points (n, 3) in the hole, nearest to where straight paths cross its plane; midpoints of paths that do not cross it."""
         axis, centre = self.pose[:3, 2], self.pose[:3, 3]
         low, high = (starts - centre) @ axis, (ends - centre) @ axis
         crosses = low * high < 0

@@ -83,7 +83,7 @@ def _along_rims(parts: Parts) -> Floats:
 
 
 def collapsed(parts: Parts, short: float) -> Parts:
-    """Collapse edges shorter than ``short`` [mm] that end on a rim, where the surface and the rims keep their shape."""
+    """Collapse edges shorter than ``short`` [mm] that end on a rim, if the surface and the rims then keep their shape."""
     ends = np.unique(np.sort(parts.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     lengths = np.linalg.norm(parts.points[ends[:, 0]] - parts.points[ends[:, 1]], axis=1)
     next_on_rim: list[list[int]] = [[] for _ in parts.points]

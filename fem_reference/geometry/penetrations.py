@@ -28,9 +28,9 @@ _GRID = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 
 _CORNERS = _GRID.argmax(axis=0)
 # The maximum edge of the first cubes [mm], and the minimum number of first cubes along the longest extent of the surface.
 _FIRST_EDGE, _FIRST_CUBES = 10.0, 20
-# The volume is not computed if the box around the surface has a volume of more than this many first cubes (a cubic metre or more).
+# The volume is not computed if the box around the surface is larger than this many of the largest first cubes (a cubic metre).
 _TOO_MANY = 1e6
-# The maximum number of subdivisions, and the maximum number of cubes after each of them and of points drawn in the last cubes.
+# The maximum number of subdivisions; the maximum number of cubes after each of them, and of points drawn in the last cubes.
 _ROUNDS, _MOST = 3, 8000
 # The maximum number of times that a triangle is cut into four for sampling; the edges are then an eighth as long.
 _PARTINGS = 3
@@ -186,9 +186,10 @@ def shared(surface: Surface, counts: NDArray[np.bool_], gaps: Floats, distance: 
     point represents, times the square root of the number of points in cubes on the border of the overlap.
 
     A point counts if its nearest triangle is in the mask ``counts`` (m,). ``distance`` returns the distance (n,) [mm] of points
-    (n, 3) to the rigid body, negative inside; ``gaps`` are the distances of the surface's points. If all points ``body``
-    (k, 3) [mm], on all sides of the rigid body, are inside the surface, the entire body counts. The volume is 0 if no counted
-    triangle enters the body and the body's centre is outside the surface. It is NaN if the surface has grown beyond a cubic metre.
+    (n, 3) to the rigid body, negative inside; ``gaps`` are the distances of the surface's points. ``body`` (k, 3) [mm]: points on
+    all sides of the rigid body; if all of them are inside the surface, the entire body counts. (They are tested only if their mean
+    is in the bounding box of the surface.) The volume is 0 if no counted triangle enters the body and no such point is inside the
+    surface. It is NaN if the bounding box is larger than a cubic metre.
     """
     extent = np.ptp(surface.points, axis=0)
     within = _within(surface, body)

@@ -61,7 +61,7 @@ class Displaced:
         return areas.sum(axis=(0, 1)), np.cross(places, areas).sum(axis=(0, 1))
 
     def motion(self) -> tuple[Floats, Floats] | None:
-        """Return the integral (3,) [mm4/s] of the velocity over the rest volume and its moment (3,) [mm5/s]; None if unknown."""
+        """Return integrals over the rest volume of the velocity (3,) [mm4/s] and of its moment (3,) [mm5/s]; None if unknown."""
         if self.by is None or self.velocity is None:
             return None
         sizes = tet_volumes(self.mesh.points, self.mesh.tets)

@@ -1,4 +1,7 @@
-"""Sums of Gaussians for scattered values, with centres from a grid, Halton's sequence, greedy search or features (report 3.5)."""
+"""Sums of Gaussians for scattered values, with centres from a grid, Halton's sequence, a greedy search or features.
+
+Numbers such as 3.6 refer to report DCSE/TR-2022-03.
+"""
 
 from dataclasses import dataclass
 
@@ -88,7 +91,7 @@ def greedy_centres(points: Floats, values: Floats, count: int, shape: float, *, 
 
 def feature_centres(points: Floats, values: Floats, count: int, *, neighbours: int = 6) -> Floats:
     """Choose ``count`` of the ``points`` (n, d): first the local maxima and minima of ``values`` (n,) among the nearest
-    ``neighbours``, then points whose values differ most from the mean of their neighbours' values, as in the report (3.5.1).
+    ``neighbours``, then points whose values differ most from the mean of their neighbours' values (3.5.1).
     """
     _, near = cKDTree(points).query(points, k=min(neighbours + 1, len(points)))
     around = values[near[:, 1:]]

@@ -83,7 +83,7 @@ class Around:
 class Between:
     """Depth inside the part of a body in which a Laplace ``field``, 0 and 1 on two attachments, is between ``first`` and ``last``.
     The depth is the difference between the field and the nearer of these values, divided by the mean slope of the field. A
-    ``first`` of 0 or a ``last`` of 1 is no border.
+    ``first`` of 0 or a ``last`` of 1 is not a border.
     """
 
     field: FibreField
@@ -101,7 +101,7 @@ class Between:
 
 
 def samples(surface: Surface) -> Floats:
-    """Points (n, 3) [mm] inside a closed ``surface``, of equal volume each: nodes of a grid of about 20,000 in its bounding box."""
+    """Points (n, 3) [mm] inside a closed ``surface``, each for an equal volume: from a grid of about 20,000 nodes around it."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     step = np.cbrt(np.prod(high - low) / _SAMPLES)
     axes = [np.linspace(a, b, 2 * max(1, round((b - a) / step)) + 1)[1::2] for a, b in zip(low, high, strict=True)]

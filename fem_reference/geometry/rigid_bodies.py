@@ -2,7 +2,7 @@
 
 Coordinates are those of the bone in its rest pose. Distances are negative inside. Gradients are unit vectors out of the bone, along
 the normal at the nearest point of the surface; curvatures are second derivatives. On ridges, where two parts of the surface are
-equally near, one of them is used. Infinite curvatures (on a sharp edge, at a centre or on an axis) are replaced by zero.
+equally near, one of them is used. Infinite curvatures (on a sharp edge, at a centre or on an axis) are replaced with zero.
 """
 
 from collections.abc import Callable
@@ -43,7 +43,7 @@ class Obstacle(Protocol):
         """
 
     def sample(self, points: Floats) -> Sampled:
-        """Distance and its two derivatives at ``points`` (n, 3) [mm], in the bone's rest pose; NaN where a coordinate is NaN."""
+        """Distance and its first two derivatives at ``points`` (n, 3) [mm], in the bone's rest pose; NaN for NaN coordinates."""
 
     def distances(self, points: Floats) -> Floats:
         """The distance (n,) [mm] of :meth:`sample`, without the derivatives."""
@@ -175,7 +175,7 @@ class Cylinder(_Rod):
         return float(min(self.radius, np.linalg.norm(np.subtract(self.end, self.start)) / 2))
 
     def sample(self, points: Floats) -> Sampled:
-        """Distance, with derivatives, to a rectangle in a half-plane whose coordinates are the distances from axis and centre."""
+        """Distance and derivatives to a rectangle in the half-plane of distances from the axis and, along it, from the centre."""
         axis, extent = _axis(self.start, self.end)
         away = points - (np.asarray(self.start, float) + self.end) / 2
         along = away @ axis
@@ -211,7 +211,7 @@ def _orthant(beyond: Floats) -> Sampled:
 
 
 def _length(vectors: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the lengths (n,) of ``vectors`` (n, d), their unit vectors (n, d) (an axis for zero), and outer products (n, d, d)."""
+    """Return lengths (n,) of ``vectors`` (n, d), unit vectors (n, d) (an axis for a zero vector), and outer products (n, d, d)."""
     length = np.linalg.norm(vectors, axis=1)
     some = np.eye(vectors.shape[1])[-1]
     unit = np.where((length == 0)[:, None], some, vectors / np.where(length == 0, 1, length)[:, None])

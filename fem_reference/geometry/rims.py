@@ -28,7 +28,7 @@ _SMOOTHED = 0.1
 # A vertex that is nearer to a crossing than this fraction of the edge moves onto it. Above 0.35 triangles degenerate; below 0.25
 # slivers remain.
 _NEAR = 0.3
-# A vertex that cannot move and is nearer to a crossing than this fraction of the edge counts as on the rim.
+# A vertex that cannot move and is nearer to a crossing than this fraction of the edge counts as lying on the rim.
 _THERE = 0.2
 # An edge across a piece of an attachment, or across a gap in it, is cut if more than this fraction of it is in the piece or gap.
 _NARROW = 0.3
@@ -36,7 +36,7 @@ _REFINED = 2  # number of rounds of the search for narrow pieces and gaps
 _ISLAND = 0.1  # the minimum area of an island of an attachment that is kept, relative to the squared triangle size
 _WIDENED = 0.1  # the maximum outward movement of a rim in each round, in triangle sizes
 _SAMPLES = 17  # the number of samples of the shares along an edge
-_TRIALS = 10  # the number of trials of the level whose line encloses the original area
+_TRIALS = 10  # the number of trials in the search for the level whose line encloses the original area
 
 
 def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size: float) -> tuple[Surface, Ints]:
@@ -133,7 +133,7 @@ def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) 
 
 
 def _refined(parts: Parts, fine: Surface, edges: "_Edges") -> Parts:
-    """Cut edges of which a large part, but neither end, is on the other side of the level 1/2."""
+    """Cut edges with both ends on one side of the level 1/2 and a large part on the other side."""
     other = (edges.along > 1 / 2) != (edges.along[:, :1] > 1 / 2)
     narrow = np.flatnonzero((other.mean(axis=1) > _NARROW) & ~other[:, -1])
     at = (other[narrow] @ np.arange(_SAMPLES) / other[narrow].sum(axis=1) / (_SAMPLES - 1))[:, None]
@@ -233,7 +233,7 @@ def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats
 
 
 def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Floats) -> tuple[Floats, Ints, Ints]:
-    """Return the points, the triangles after cuts of the ``chosen`` edges at ``middles`` (k, 3) on ``fine``, and their parents."""
+    """Cut the ``chosen`` edges at ``middles`` (k, 3) on ``fine``; returns the points, the triangles and their parents."""
     new = np.full(len(edges.ends), -1)
     new[chosen] = len(parts.points) + np.arange(len(chosen))
     points = np.concatenate([parts.points, distances(middles, fine).closest])

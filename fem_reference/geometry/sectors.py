@@ -21,8 +21,9 @@ def sectors(surface: Surface) -> Ints:
 def attached_shares(surface: Surface, vertices: Ints) -> Floats:
     """Attached share, 1 or 0, of each corner (m, 3) of the triangles of ``surface``, for the attached ``vertices`` (k,).
 
-    If any triangle at a vertex is completely attached, only the corners there in a sector with such a triangle are attached, not
-    those across a sharp edge. This attaches the end of a muscle, but not a strip of arbitrary width of the belly next to it.
+    If any triangle at a vertex is completely attached, then of the corners at this vertex only those in a sector with such a
+    triangle are attached, not those across a sharp edge. So the end of a muscle is attached, but not a strip of the
+    belly next to it, whose width would be arbitrary.
     """
     attached = np.zeros(len(surface.points), bool)
     attached[vertices] = True

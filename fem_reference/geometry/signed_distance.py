@@ -30,7 +30,7 @@ from fem_reference.geometry.distance import distances, inside
 from fem_reference.geometry.kept_meshes import code, kept
 from fem_reference.geometry.rigid_bodies import Sampled, Vector
 
-# The distance [mm] returned outside a grid: farther than any real distance, but finite.
+# The distance [mm] returned outside a grid: greater than any real distance, but finite.
 FAR = 1e6
 # The maximum number of nodes of a grid that ``resolve`` refines: 256 cubed, 134 MB.
 MOST_NODES = 2**24
@@ -56,11 +56,12 @@ logger = logging.getLogger(__name__)
 class Grid:
     """The shape of a bone whose signed distance is a tricubic spline.
 
-    ``coefficients`` (i, j, k) [mm]: the coefficients of B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``.
-    The distance is valid within ``margin`` [mm] of the surface; farther away it is less accurate, and it is ``FAR`` outside the
-    grid. ``error`` [mm]: the largest sampled difference from the exact distance within one spacing of the surface.
-    ``mean_error`` [mm]: the root mean square, not the mean, of these differences. Farther away, ridges between two close parts of
-    the surface are rounded, like edges, by a third of a spacing. The gradient has length 1 within a few per cent, except on edges.
+    ``coefficients`` (i, j, k) [mm]: the coefficients of B-splines about nodes ``spacing`` [mm] apart. ``origin`` [mm]: the
+    node with the lowest x, y and z. The distance is valid within ``margin`` [mm] of the surface; farther away it is less accurate,
+    and it is ``FAR`` outside the grid. ``error`` [mm]: the largest sampled difference from the exact distance within one spacing of
+    the surface. ``mean_error`` [mm]: the root mean square, not the mean, of these differences. Farther away, ridges between two
+    close parts of the surface are rounded, like edges, by a third of a spacing. The gradient has length 1 to within a few per cent,
+    except on edges.
     """
 
     coefficients: Floats
@@ -81,7 +82,7 @@ class Grid:
 
     @cached_property
     def half_thickness(self) -> float:
-        """An upper bound on the depth [mm], from the smallest coefficient; infinite if the nodes are too far apart for one."""
+        """An upper bound on the depth [mm], from the smallest coefficient; infinite if the nodes are too far apart to give one."""
         deepest = float(-self.coefficients.min())
         return deepest if deepest > self.spacing else np.inf
 
@@ -106,14 +107,14 @@ class Grid:
         return found
 
     def _inside(self, points: Floats) -> Iterator[tuple[Ints, Floats]]:
-        """Yield chunks of the indices of ``points`` (n, 3) inside the grid, and their positions in cells from the origin."""
+        """Yield chunks of the indices of ``points`` (n, 3) inside the grid, and their positions from the origin in cells."""
         at = (points - self.origin) / self.spacing
         inside = np.flatnonzero(((at >= 1) & (at <= np.array(self.coefficients.shape) - 2)).all(axis=1))
         for chunk in np.split(inside, range(_AT_ONCE, len(inside), _AT_ONCE)) if len(inside) else ():
             yield chunk, at[chunk]
 
     def _values(self, at: Floats, orders: int) -> Floats:
-        """Derivatives (n, orders, orders, orders) of orders below ``orders`` along x, y and z, per cell, at positions (n, 3)."""
+        """Derivatives (n, orders, orders, orders) of order 0 to ``orders`` - 1 along x, y and z, at positions (n, 3) in cells."""
         shape = self.coefficients.shape
         cell = np.minimum(at.astype(np.int64), np.array(shape) - 3)
         x, y, z = (_weights(at[:, axis] - cell[:, axis], orders) for axis in range(3))
@@ -124,7 +125,7 @@ class Grid:
         return np.asarray(values.reshape(-1, orders, orders, orders))
 
     def _interpolate(self, at: Floats) -> Sampled:
-        """Distance and its two derivatives at positions (n, 3) in units of cells from the origin."""
+        """Distance and its first two derivatives at positions (n, 3) in units of cells from the origin."""
         values = self._values(at, 3)
         curvature = np.empty((len(at), 3, 3))
         for i, j in np.ndindex(3, 3):
@@ -134,7 +135,7 @@ class Grid:
 
 
 def _weights(within: Floats, orders: int) -> Floats:
-    """Value and derivatives below ``orders``, (n, orders, 4), of the four B-splines of a cell at ``within`` (n,), from 0 to 1."""
+    """Derivatives of orders below ``orders`` (n, orders, 4) of the four B-splines of a cell at ``within`` (n,), from 0 to 1."""
     one, none = np.ones_like(within), np.zeros_like(within)
     found = [np.stack([one, within, within**2, within**3], axis=1)]
     if orders > 1:
@@ -145,12 +146,11 @@ def _weights(within: Floats, orders: int) -> Floats:
 
 def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:
     """Sample the signed distance to a closed ``surface`` on a grid with nodes ``spacing`` [mm] apart; it is valid within
-    ``margin`` [mm]. Triangles may have any orientation. Raises InputError if the surface does not bound one body (see
-    ``check_closed``).
+    ``margin`` [mm] of the surface. Triangles may have any orientation. Raises InputError if the surface does not bound one body
+    (see ``check_closed``).
 
     ``rounding`` is the standard deviation s [mm] of a Gaussian filter of the distance, used because contact does not slide smoothly
-    over the edges between flat triangles. A surface with a mean curvature of 1/r moves inward by s^2/r; this shift is part of the
-    error.
+    over the edges between flat triangles. A surface with a mean curvature of 1/r moves inward by s^2/r; this is part of the error.
     """
     surface = _outward(surface)
     return _measured(_sampled(surface, spacing, margin)(rounding), surface)
@@ -262,7 +262,7 @@ def _mean(differences: Floats) -> float:
 
 
 def _on(surface: Surface) -> Floats:
-    """Return all vertices, the midpoints of edges and triangles, and random points on edges (more on longer edges): (n, 3) [mm]."""
+    """Return all vertices, edge midpoints and triangle centroids, and random points on edges (more on longer ones): (n, 3) [mm]."""
     random = np.random.default_rng(0)
     ends = surface.points[surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

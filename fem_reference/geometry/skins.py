@@ -36,7 +36,7 @@ class Skin:
 
 
 def spacing(surface: Surface) -> float:
-    """Maximum average distance [mm] between material points on a ``surface``, independent of its mesh."""
+    """Upper limit [mm] of the mean distance between material points on a ``surface``, independent of its mesh."""
     return diagonal(surface.points) / _ACROSS
 
 
@@ -52,7 +52,7 @@ def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float)
 
 def points(corners: Floats, shares: Floats) -> tuple[Floats, Floats]:
     """Return three points (3 k, 3) [mm] in each triangle with ``corners`` (k, 3, 3), by a rule exact for quadratic functions, and
-    their areas (3 k,) [mm2], weighted by ``shares`` (k, 3). No point is on a sharp edge, where it would touch on two faces at once.
+    their areas (3 k,) [mm2], weighted by ``shares`` (k, 3). No point is on a sharp edge, where it would belong to two faces.
     """
     areas = np.repeat(corner_areas(corners) / 3, 3) * (shares @ _RULE.T).ravel()
     return np.einsum("qk,tki->tqi", _RULE, corners).reshape(-1, 3), areas
@@ -91,7 +91,7 @@ class Pieces:
         return Pieces(np.tile(self.parents, 4), quartered(self.corners))
 
     def halved(self, lengths: Floats) -> "Pieces":
-        """Cut each piece into two at the midpoint of its longest edge; ``lengths`` (k, 3): of the edge beginning at each corner."""
+        """Cut each piece into two at the midpoint of its longest edge; ``lengths`` (k, 3): see :func:`edge_lengths`."""
         order = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
         a, b, c = np.swapaxes(np.take_along_axis(self.corners, order[:, :, None], axis=1), 0, 1)
         halves = [np.stack([a, (a + b) / 2, c], axis=1), np.stack([(a + b) / 2, b, c], axis=1)]

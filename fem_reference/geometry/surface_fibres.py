@@ -1,4 +1,7 @@
-"""Fibres inside a muscle from Catmull-Rom splines between fibres on its surface: the CHMD of Kohout and Cholt (report 6.1.2)."""
+"""Fibres inside a muscle from Catmull-Rom splines between fibres on its surface.
+
+The method is CHMD by Kohout and Cholt (report DCSE/TR-2022-03, 6.1.2).
+"""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -10,15 +13,15 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.geometry.curves import catmull_rom, knots
 from fem_reference.geometry.fibres import POINTS, resample
 
-_THIN = 1e-6  # the squared ratio of thickness to width of a section below which its lines count as on one surface
+_THIN = 1e-6  # the squared ratio of thickness to width of a section below which its lines count as lying on one surface
 _GOLDEN = np.pi * (3 - np.sqrt(5))  # the golden angle [rad], as between consecutive seeds of a sunflower
 
 
 def between(heads: Sequence[Polylines], count: int) -> Polylines:
-    """Create ``count`` lines of 40 points between the surface fibres of each of ``heads``, more in heads of larger cross-section.
+    """Create ``count`` lines of 40 points between the surface fibres of ``heads``, more lines in heads of larger cross-section.
 
     The surface fibres of a head, three or more in any order, must surround it. Each point of a line is on a spline through three
-    points: two opposite points of a closed spline around the head, and the mean of its fibres between them.
+    points: two opposite points of a closed spline around the head and, between them, the mean of the head's surface fibres.
     """
     grids = [_around(_alike(lines, i)) for i, lines in enumerate(heads)]
     lines = [line for grid, share in zip(grids, _shares(grids, count), strict=True) for line in _inside(grid, share)]
@@ -37,14 +40,16 @@ def _alike(lines: Polylines, head: int) -> Floats:
 
 
 def _around(lines: Floats) -> Floats:
-    """Sort ``lines`` (m, 40, 3) by the angles of their midpoints around the head, beginning with the farthest."""
+    """Sort ``lines`` (m, 40, 3) by the angles of their midpoints around their mean line, beginning with the farthest from it."""
     arms = _halfway(lines)
     angles = np.arctan2(arms[:, 1], arms[:, 0]) % (2 * np.pi)
     return np.asarray(lines[np.argsort(np.where(angles > 2 * np.pi - 1e-9, 0.0, angles))])
 
 
 def _halfway(lines: Floats) -> Floats:
-    """Positions (m, 2) [mm] of the midpoints of ``lines`` (m, 40, 3) across their mean line; the farthest is on the first axis."""
+    """Positions (m, 2) [mm], in a plane across their mean line, of the midpoints of ``lines`` (m, 40, 3). The midpoint that is
+    farthest from the mean line is on the first axis.
+    """
     mean = lines.mean(axis=0)
     normal = mean[POINTS // 2 + 1] - mean[POINTS // 2 - 1]
     normal /= np.linalg.norm(normal)

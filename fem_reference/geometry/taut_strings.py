@@ -53,8 +53,8 @@ def halved(string: Floats) -> Floats:
 
 
 def touching(obstacle: SmoothSurface, string: Floats) -> Flags:
-    """Mask (n, N) of the points of strings that may touch an obstacle: they are nearer to it than a tangent is, a third of a piece
-    away from the point at which the tangent touches it.
+    """Mask (n, N) of the points of strings that may touch an obstacle: those nearer to it than a tangent line is at a distance of a
+    third of a piece from the point of tangency.
     """
     value, slope = obstacle.level(string.reshape(-1, 3))
     away = (value / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)).reshape(string.shape[:2])

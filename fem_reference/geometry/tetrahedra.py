@@ -37,10 +37,10 @@ from fem_reference.geometry.rims import with_rims
 log = logging.getLogger(__name__)
 
 SECONDS_ALLOWED = 240.0
-_ROUNDED = 6  # decimals [mm] in the mesher's frame: far finer than any mesh, far coarser than the round-off of a motion
+_ROUNDED = 6  # decimals of coordinates [mm] for the mesher: far finer than any mesh, far coarser than the round-off of a motion
 # The accepted relative difference in volume; a smaller value would fail, as the volume of a self-intersecting surface is ambiguous.
 _VOLUME_WITHIN = 0.05
-_MOST_TETS = 3e6  # a mesh that takes several GB and minutes to make, and is far too large for a solver
+_MOST_TETS = 3e6  # a mesh of this size takes several GB and minutes to make, and is far too large for a solver
 _MAKERS = {"gmsh": "gmsh", "tetwild": "fTetWild"}
 _SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # factors on the requested number of triangles, tried in this order
 
@@ -119,8 +119,8 @@ def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) ->
 
 
 def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> tuple[Surface, Ints]:
-    """Return the surface with edges along the rims of attachments, and the labels of its triangles, 0 if free. It has as many
-    triangles as equilateral triangles of side ``size`` are needed to cover it, and is unchanged if it has fewer.
+    """Return the surface with edges along the rims of attachments, and the labels of its triangles, 0 if free. It is
+    coarsened to the number of equilateral triangles of side ``size`` that would cover it, unless it already has fewer triangles.
 
     If the coarse surface intersects itself, a few other numbers of triangles are tried, and finally a surface without rims.
     """

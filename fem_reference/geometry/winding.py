@@ -178,7 +178,7 @@ def around(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> 
 
 
 def _wrong(obstacles: Sequence[SmoothSurface], found: Winding, string: Floats) -> Flags:
-    """Mask (n,) of paths that cross an obstacle, or are more than 2 % longer than the string, whose chords are slightly short."""
+    """Mask (n,) of paths that cross an obstacle, or are more than 2 % longer than the string, whose chords cut curves short."""
     count = len(string)
     even = np.broadcast_to(np.linspace(0, 1, _CHECKED), (count, _CHECKED))
     shares = np.stack([*even.T, *(_deepest(one, found) for one in obstacles if isinstance(one, Quadric))], axis=1)

@@ -2,7 +2,7 @@
 
 On the surface a path is a geodesic: a great circle of the sphere or a helix of the cylinder. Seen along the axis of rotation, each
 is an arc of a circle between two tangents, so one closed form holds for both (the "obstacles" of Garner and Pandy 2000, Comput.
-Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/10255840008915251; report 5.3).
+Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/10255840008915251; report DCSE/TR-2022-03, 5.3).
 """
 
 from dataclasses import dataclass
@@ -75,7 +75,7 @@ class Paths:
 
 def around(obstacle: Quadric, starts: Floats, ends: Floats) -> Paths:
     """Compute the shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along a great circle through both
-    points, or around a cylinder, along a helix. Points inside the obstacle are treated as on its surface.
+    points, or around a cylinder, along a helix. Points inside the obstacle are treated as lying on its surface.
     """
     middle = obstacle.pose[:3, 3]
     if np.isfinite(obstacle.radii[2]):
@@ -98,9 +98,9 @@ def straight(starts: Floats, ends: Floats) -> Paths:
 def _around(starts: Floats, ends: Floats, middle: Floats, axes: Floats, radius: float) -> Paths:
     """Compute paths that rotate from starts to ends, by at most half a turn, about ``axes`` (n, 3) through ``middle`` (3,).
 
-    Seen along the axis, two points at distances d1, d2 from it and at an angle t from each other are joined by tangents of the
-    lengths sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)). If the angle in brackets is not positive, the path is
-    straight. The displacement along the axis is distributed uniformly over this length: unrolled, the path is a straight line.
+    Seen along the axis, two points at distances d1, d2 from it and at an angle t from each other are joined by tangents of length
+    sqrt(d^2 - r^2) and an arc of length r (t - acos(r / d1) - acos(r / d2)). If the angle in brackets is not positive, the path
+    is straight. The displacement along the axis is uniform over the length of these: unrolled, the path is a straight line.
     """
     one, other = _across(starts - middle, axes), _across(ends - middle, axes)
     sines, cosines = np.sum(np.cross(one, other) * axes, axis=1), np.sum(one * other, axis=1)
