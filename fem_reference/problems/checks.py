@@ -94,7 +94,7 @@ def check_frames(frames: object, place: str) -> None:
         or len(frames) == 0
         or not all(_is_number(one) for one in frames)
     ):
-        raise InputError(place, said(frames), "at least one frame number")
+        raise InputError(place, said(frames), "one or more frame numbers")
     if not all(early < late for early, late in pairwise(frames)):
         raise InputError(place, said(frames), "increasing frame numbers")
     if len(frames) > _MOST:

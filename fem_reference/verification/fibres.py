@@ -140,7 +140,7 @@ ENTRIES = (
             material=NEO + two_families(31.0),
         )
         for mode, words in (
-            ("uniaxial", "stretched along the bisector of their directions"),
+            ("uniaxial", "stretched along their bisector"),
             ("equibiaxial", "stretched in their plane"),
         )
     ),
