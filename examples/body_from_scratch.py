@@ -1,6 +1,6 @@
 """A body without a scene file: points and cells in Python, a prescribed displacement, and the moment that it requires.
 
-A bar of square section, free to warp, is twisted by one degree; in small strain its torque is 0.1406 mu a^4 theta / L
+A bar of square section, free to warp, is twisted by one degree; at small strain its torque is 0.1406 mu a^4 theta / L
 (Timoshenko and Goodier 1970).
 """
 
@@ -43,6 +43,6 @@ middle = fr.Prescribed("top", "top", (0, 1), twist)
 still = fr.Prescribed("still", "bottom", (2,), lambda rest, _: 0 * rest, stiffness=1e-6)  # except for weak springs
 solved = fr.solve_body(fr.Body(mesh, effects, (bottom, middle, still), frames=(0.0, 1.0)), first_step=1)
 torque = 0.1406 * MU * SIDE**4 * ANGLE / LENGTH
-print("torque [N mm]:", solved.last.moments["top"][2], "in small strain:", torque)
+print("torque [N mm]:", solved.last.moments["top"][2], "at small strain:", torque)
 print("ratio:", solved.last.moments["top"][2] / torque)
-# Ends in 1 within 5e-3: torsion in small strain.
+# Ends in 1 within 5e-3: torsion at small strain.

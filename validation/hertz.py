@@ -1,4 +1,4 @@
-"""Contact of two spheres, or of a sphere and a half-space, without friction, in small strain (Hertz).
+"""Contact of two spheres, or of a sphere and a half-space, without friction, at small strain (Hertz).
 
 Source: Johnson 1985, Contact Mechanics, ch. 3.4 and 4.2, doi 10.1017/CBO9781139171731; after Hertz 1882,
 doi 10.1515/crll.1882.92.156.

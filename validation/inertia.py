@@ -12,7 +12,7 @@ def fall(acceleration: float, seconds: float) -> float:
 
 
 def uniaxial_modulus(mu: float, bulk: float) -> float:
-    """Modulus [MPa] of a bar in small strain whose sides cannot move."""
+    """Modulus [MPa] of a bar at small strain whose sides cannot move."""
     return bulk + 4 / 3 * mu
 
 

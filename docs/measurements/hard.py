@@ -9,7 +9,7 @@ from measurements.tables import Measurement, kept, table
 
 # Final states of the reference with other numbers of load steps, as in the sentences of the verb stress.
 _ENDS = re.compile(r"end state at frame (\d+) by number of load steps: (.*?)(?:$|;)")
-_END = re.compile(r"(\d+): (?:([\d.e+-]+) % from that of (\d+)|([a-z ]+))")
+_END = re.compile(r"(\d+): (?:([\d.e+-]+) % of the body's size from the end state with (\d+) load steps|([a-z ]+))")
 _STEPS = ("1", "10", "40")
 # Runs on other meshes, as in the sentences of the verb stress.
 _MESHES = re.compile(

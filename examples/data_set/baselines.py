@@ -1,4 +1,4 @@
-"""Learned baselines and shipped solvers on the test frames of a data set: ``python baselines.py FOLDER JSON``."""
+"""Learned and shipped solvers on the test frames of a data set: ``python baselines.py FOLDER JSON``."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""Learned baselines on unseen poses and shapes: ``python learn.py FOLDER`` prints mean distances of vertices from the truth."""
+"""Learned solvers on unseen poses and shapes: ``python learn.py FOLDER`` prints mean distances of vertices from the truth."""
 
 import runpy
 import sys

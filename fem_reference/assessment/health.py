@@ -236,7 +236,7 @@ def unstable(run: Followed) -> str:
         return ""
     first, most = int(np.argmax(run.negative_modes > 0)), run.negative_modes.max()
     own = np.nan if run.material_modes is None else np.nanmax(run.material_modes)
-    doubt = "" if np.isnan(own) else f", of which the material has {own:.0f} for certain"
+    doubt = "" if np.isnan(own) else f", at least {own:.0f} of them due to the material"
     return f"an unstable equilibrium from frame {run.numbers[first]} on, with up to {most:.0f} negative modes{doubt}"
 
 

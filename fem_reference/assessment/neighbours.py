@@ -42,7 +42,7 @@ def between(problem: MusclesProblem, run: Run, nodes: Nodes, states: Displacemen
         skins = [skin_of(problem.problems[span.name].mesh) for span in pair]
         edge = max(float(edge_lengths(one.points[one.triangles]).max()) for one in skins)
         law = problem.law
-        name = f"{pair[0].name} and {pair[1].name} in each other"
+        name = f"penetration of {pair[0].name} and {pair[1].name} into each other"
         for i, number in enumerate(run.numbers):
             give = 0.0 if law is None else float(pressures[i]) / law.stiffness + law.smoothing
             bulge = _BULGE * edge if pressures[i] > 0 else 0.0

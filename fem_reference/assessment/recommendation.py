@@ -122,7 +122,9 @@ def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], met
     if _is_share(metric):
         return studies
     if not features["motion"] > 0:
-        raise InputError(case, "bones that do not move", "a study of the case itself: fem-reference study makes one")
+        raise InputError(
+            case, "bones that do not move", "a study of the case itself: fem-reference study CASE makes one"
+        )
     found = [study for study in studies if study.features["motion"] > 0]
     if not found:
         raise InputError("studies", "none of a case whose bones move", f"such a study, or a study of {case} itself")

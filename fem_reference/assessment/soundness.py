@@ -57,4 +57,4 @@ def _stuck(mine: Floats, truth: Floats) -> str:
     if not stuck.any():
         return ""
     most = wanted[stuck].max() * size
-    return f"stuck: {stuck.sum()} vertices never move, but by up to {most:.3g} mm in the reference"
+    return f"stuck: {stuck.sum()} vertices never move, although they move by up to {most:.3g} mm in the reference"

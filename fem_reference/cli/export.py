@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
         return _runs_of_several(scene, options) if scene.parts else _runs(casefile.muscle(scene), options)
     if options.candidate or options.unit or options.solve:
         got = f"--candidate, --unit or --solve for {options.format}"
-        raise InputError("export", got, f"these options for {PARAVIEW} only")
+        raise InputError("export", got, f"none of them: they are for {PARAVIEW} only")
     bench = Bench(scene if scene.parts else casefile.muscle(scene), out(options) / "runs")
     written = export.export(bench.scene, bench.problem, options.to, options.format)
     facts = {"case": scene.name, "folder": str(options.to), "files": written}
@@ -71,7 +71,8 @@ def _runs_of_several(case: Case, options: argparse.Namespace) -> int:
     """Write the reference and the candidates of each muscle for ParaView, without states, into a folder with the muscle's name."""
     check(options.to)
     if options.solve:
-        raise InputError("--solve", "several muscles", "no such option: their states are not written")
+        want = "a case with one muscle, because states of several muscles are not written"
+        raise InputError("--solve", "several muscles", want)
     chosen = [choose(case, text, options.unit) for text in options.candidate]
     found = by_muscle.compared(checked_bench(case, options, chosen), chosen)
     count = sum(len(paraview.write(one, options.to / name)) for name, one in found.muscles.items())
@@ -93,5 +94,5 @@ def _with_states(bench: Bench[MuscleCase], *, again: bool) -> Run:
     if known and known.folder and not again and not states.are_kept(known.folder, known.numbers):
         took = duration(known.outcome.cost.get("seconds"))
         got = f"a reference that was solved without storing the states that stress and pressure need ({known.folder})"
-        raise InputError("export", got, f"--solve, which solves it again (the last time in {took})")
+        raise InputError("export", got, f"--solve, which solves it again (last time this took {took})")
     return bench.obtain("reference", choice.model_copy(update={"store_state": True}), "reference")

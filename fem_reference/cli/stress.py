@@ -25,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--solver", default=[], choices=[*records.choices(), COMMAND], metavar="NAME", help=only)
     program = "a program in a folder, as in standings; without --solver only such programs run; may be repeated"
     parser.add_argument("--program", action="append", default=[], type=Path, metavar="DIR", help=program)
-    many = "solve the farthest frame of frictionless cases in 1, 10 and 40 load steps as well (reference only); results must agree"
+    many = "solve the farthest frame of frictionless cases with 1, 10 and 40 load steps too (reference only); results must agree"
     parser.add_argument("--steps", action="store_true", help=many)
     meshes = "run the reference on N randomly perturbed meshes of each case as well"
     parser.add_argument("--jitters", type=int, default=0, metavar="N", help=meshes)

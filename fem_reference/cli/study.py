@@ -16,7 +16,7 @@ from fem_reference.studies import cost
 from fem_reference.studies.campaign import Workers
 
 PAGE = "study"
-HELP = "measure error against time: reference and candidates over series of settings; write the page"
+HELP = "measure error against time: reference and candidates over series of settings; write a page"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -14,7 +14,7 @@ from fem_reference.report.asked import Asked, Part
 from fem_reference.runs.key import versions
 from fem_reference.verification import runner
 
-HELP = "measure problems with known answers, and write the page"
+HELP = "measure the errors of problems with known answers, and write a page"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

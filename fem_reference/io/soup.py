@@ -103,7 +103,7 @@ def checked_cells(sizes: Any, corners: Any, points: int) -> PointLists:
     """
     sizes, corners = np.asarray(sizes, np.int64), np.asarray(corners, np.int64)
     if (sizes < 0).any() or (sizes > len(corners)).any() or sizes.sum() != len(corners):
-        raise ValueError(f"cells that do not fit in their {len(corners)} corners")
+        raise ValueError(f"cells whose sizes are negative or do not add up to {len(corners)} corners")
     if len(wrong := np.flatnonzero((corners < 0) | (corners >= points))):
         cell = np.searchsorted(np.cumsum(sizes), wrong[0], side="right")
         raise ValueError(f"cell {cell} with a point outside 0 to {points - 1}")

@@ -96,7 +96,7 @@ def _frame(surface: Surface, number: int, context: MeasurementContext, allowed: 
         inside = shared(fine, exempt.felt, gaps, partial(bone.distances, number), there)
         found = _deepest(exempt, fine, bone.name, gaps, allowed[bone.name])
         if inside.deepest > _MIDDLE * bone.shape.half_thickness:
-            found = max(found, _Worst(inside.deepest, f"around the middle of {bone.name}"), key=_value)
+            found = max(found, _Worst(inside.deepest, f"near the centre of {bone.name}"), key=_value)
         deepest = max(deepest, found, key=_value)
         volume += inside.volume
         largest = max(largest, _Worst(inside.volume, f"most in {bone.name}"), key=_value)

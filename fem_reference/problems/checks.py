@@ -75,7 +75,7 @@ def check_box(counts: object, size: object, kind: object, degree: object) -> Non
     ):
         raise InputError("size", said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
     if not max(size) < _LONGEST * min(size):
-        raise InputError("size", said(size), f"edges less than {_LONGEST:g} times as long as each other")
+        raise InputError("size", said(size), f"edges whose lengths differ by a factor of less than {_LONGEST:g}")
     _check_kind("", kind, degree)
 
 
@@ -94,7 +94,7 @@ def check_frames(frames: object, place: str) -> None:
         or len(frames) == 0
         or not all(_is_number(one) for one in frames)
     ):
-        raise InputError(place, said(frames), "frame numbers, at least one")
+        raise InputError(place, said(frames), "one or more frame numbers")
     if not all(early < late for early, late in pairwise(frames)):
         raise InputError(place, said(frames), "increasing frame numbers")
     if len(frames) > _MOST:
@@ -210,7 +210,7 @@ def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
         facets = set(sorted_corners(mesh.facets[name]))
         lost = sorted(facets - boundary)
         if not facets:
-            raise InputError(f"facets.{name}", "none", "facets of one cell each")
+            raise InputError(f"facets.{name}", "none", "at least one facet on the boundary of the cells")
         if lost:
             some = f"{len(lost)} of {len(facets)}, the first with corners {lost[0]}"
             got = f"facets that do not belong to one cell each ({some})"

@@ -143,7 +143,7 @@ def check_bone(place: str, surface: Surface, shape: Obstacle, muscle: Surface, a
 
 def check_exempt(exempt: Exemption, place: str) -> None:
     """Raise InputError if most of the unattached surface is exempt from contact; log a warning if more than a quarter is exempt."""
-    got = f"attachments within {exempt.reach:.2g} mm of {100 * exempt.lost:.0f} % of the unattached surface, without contact there"
+    got = f"{100 * exempt.lost:.0f} % of the unattached surface without contact (within {exempt.reach:.2g} mm of attachments)"
     if not exempt.lost <= _LOST:
         raise InputError(place, got, f"at most {100 * _LOST:.0f} %: larger or fewer attachments, or no contact effect")
     if exempt.lost > _LOST / 2:

@@ -101,7 +101,7 @@ def described_motion(rest: Setup) -> str:
         return ""
     most = int(np.abs(lengths - lengths[0]).argmax())
     how = "longer" if lengths[most] > lengths[0] else "shorter"
-    change = f"{100 * abs(lengths[most] / lengths[0] - 1):.0f} % {how}, in frame {rest.frames[most]}"
+    change = f"{100 * abs(lengths[most] / lengths[0] - 1):.0f} % {how}, at frame {rest.frames[most]}"
     names = f"{rest.attached[0].attachment} to {rest.attached[-1].attachment}"
     return f"the distance from {names} is {lengths[0]:.4g} mm at rest, and at most {change}"
 

@@ -78,7 +78,8 @@ def facts(case: Case, setup: CaseSetup) -> dict[str, object]:
         known = {name: _facts_of_muscle(rest, part) for part, (name, rest) in own}
         return {
             **known,
-            "may touch": ", ".join(pairs) or ("none" if case.touching else "none, without the effect touching"),
+            "may touch": ", ".join(pairs)
+            or ("none" if case.touching else 'none, as the effect "touching" is not listed'),
         }
     assert isinstance(setup, FieldProblem)  # there are no other types
     mesh, fixed = setup.mesh, int(np.isfinite(setup.fixed).sum())

@@ -161,9 +161,8 @@ class _Samples:
         """The InputError for the thing that moves farthest in the interval ``i``."""
         far = [float(strides[i].max()) for strides in self.strides]
         which = int(np.argmax(far))
-        got = (
-            f"{far[which]:.4g} mm up to frame {self.frames[i + 1]:g}, or a rotation by {self.angles[which][i]:.3g} rad"
-        )
+        by = f"by frame {self.frames[i + 1]:g}"
+        got = f"movement by up to {far[which]:.4g} mm and rotation by {self.angles[which][i]:.3g} rad {by}"
         return InputError(f"{self.things[which].place}: path at frame {self.frames[i]:g}", got, "a path without jumps")
 
     def farthest(self, at: int) -> int:

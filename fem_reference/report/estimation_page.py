@@ -51,7 +51,7 @@ def said(found: Estimation) -> str:
         sentences.append(
             f"{most} Gaussians deviate from a muscle's surface by "
             f"{min(one.rms for one in fits):.2g} to {max(one.rms for one in fits):.2g} mm rms, with "
-            f"{min(one.fewer for one in fits):.0f} to {max(one.fewer for one in fits):.0f} times fewer parameters"
+            f"1/{max(one.fewer for one in fits):.0f} to 1/{min(one.fewer for one in fits):.0f} of the parameters"
         )
     return "; ".join(sentences) or "nothing was measured"
 

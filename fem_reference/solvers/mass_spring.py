@@ -190,7 +190,7 @@ class MassSpringModel:
         ``frame_time`` differs from the interval of the scene, both times.
         """
         frames, count, tets = self.problem.frames, self._inverted(), len(self.problem.mesh.tets)
-        done = f"{frames[-1] - frames[0]} frame numbers, each of {self.steps} steps of {self.time_step:.3g} s"
+        done = f"{frames[-1] - frames[0]} frame numbers with {self.steps} steps of {self.time_step:.3g} s each"
         note = f"; {count} of {tets} tetrahedra are inside out at the last frame" if count else ""
         return Outcome("converged", done + note + other_clock(self.problem, self.settings.frame_time))
 

@@ -114,7 +114,7 @@ class Cloud:
 class RbfMuscle(MovingSurface):
     """The muscle as an implicit surface, advanced from each frame number to the next."""
 
-    advice = "a slower motion, more iterations, or contact = false, may help"
+    advice = "a slower motion, more iterations or contact = false may help"
 
     def __init__(self, setup: Setup, settings: RbfSettings) -> None:
         super().__init__(setup)

@@ -97,7 +97,7 @@ class Bundle:
 class Rods(MovingSurface):
     """A muscle as k rods with p points each, and a surface that moves with them. ``rods`` (k, p, 3): present points [mm]."""
 
-    advice = "a slower motion, more iterations, or contact = false, may help"
+    advice = "a slower motion, more iterations or contact = false may help"
 
     def __init__(self, problem: MuscleProblem, settings: ViperSettings) -> None:
         super().__init__(problem)

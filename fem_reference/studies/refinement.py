@@ -189,7 +189,7 @@ def solutions[C: DrivenCase](
         except InputError as error:
             if name != EXACT:
                 raise
-            log.warning("error bar: the change by exact attachments is not known: %s", error)
+            log.warning("error bar: the change due to exact attachments is not known: %s", error)
             return None
 
     numbered = list(enumerate(scenes))

@@ -126,7 +126,9 @@ ENTRIES: tuple[Entry, ...] = (
     tip_entry("nearly_incompressible", NEARLY, "P2/P1", LINEAR, (0.005, "0.16 %")),
     tip_entry("hexahedra", NEARLY, "Q2/Q1", STIFF, (0.001, "0.02 %"), slow=True),
     tip_entry("constant_pressure", NEARLY, "Q1/P0", LINEAR_HEXAHEDRA, (0.015, "0.5 %")),
-    tip_entry("stabilised", NEARLY, "P1/P1", LINEAR, (0.04, "22, 7.7 and 2.2 % with 8, 16 and 32 cells a side")),
+    tip_entry(
+        "stabilised", NEARLY, "P1/P1", LINEAR, (0.04, "22, 7.7 and 2.2 % with 8, 16 and 32 cells along each side")
+    ),
     tip_entry("quarter_load", QUARTER, "P2/P1", SMALL_STRAIN, (0.005, "0.17 %"), slow=True),
     tip_entry("quarter_load_hexahedra", QUARTER, "Q2/Q1", STIFF, (0.001, "0.02 %"), **SLOW),
     tip_entry("full_load", FULL, "Q2/Q1", SMALL_STRAIN, (0.002, LEFT_OPEN), slow=True, refinement=SHORT),

@@ -139,7 +139,10 @@ ENTRIES = (
             "The families are at 31 instead of 30 degrees.",
             material=NEO + two_families(31.0),
         )
-        for mode, words in (("uniaxial", "stretched midway between them"), ("equibiaxial", "stretched in their plane"))
+        for mode, words in (
+            ("uniaxial", "stretched along their bisector"),
+            ("equibiaxial", "stretched in their plane"),
+        )
     ),
     force(
         "prestretch_fixed",

@@ -155,7 +155,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     LOAD(
         name="pressure_turns",
-        title="Block that leans under a pressure on one side, then turned by 90 degrees: largest error of a node",
+        title="Block that leans under a pressure on one side, then turned by 90 degrees: largest error of a nodal position",
         unit="mm",
         measure=turned,
         given={"load": pressed(0.2 * MU)},

@@ -73,7 +73,7 @@ LEFT = "rounding and Newton's residual of 1e-13 N remain, 3e-11 mm in the softes
 BLOCK = Entry(
     name="turned_block",
     group="rigid motion",
-    title="Block whose surface is turned by 1 rad about an oblique axis in one step: largest error of a node",
+    title="Block whose surface is turned by 1 rad about an oblique axis in one step: largest error of a nodal position",
     unit="mm",
     measure=turned_error,
     given={"material": NEO, "element": "Q2/Q1", "faces": SURFACE},
@@ -93,7 +93,7 @@ ENTRIES = (
             name=f"patch_{element.lower().replace('/', '_')}{'_curved' if degree == 2 else ''}",
             group="patch tests",
             title=f"{element} on {'curved' if degree == 2 else 'distorted'} cells represents a stretch, a shear and a turn at "
-            "once: largest error of a node",
+            "once: largest error of a nodal position",
             measure=patch_error,
             given={"element": element, "degree": degree},
             **control("The surface is moved 1 % too far.", share=1.01),
@@ -118,7 +118,7 @@ ENTRIES = (
     replace(
         BLOCK,
         name="turned_muscle",
-        title="Contracting block whose ends are turned by 1 rad about an oblique axis: largest error of a node",
+        title="Contracting block whose ends are turned by 1 rad about an oblique axis: largest error of a nodal position",
         given={"material": NEO + active(0.03), "element": "P2/P1", "faces": ENDS},
         negative_control="One end is turned 1 % further.",
         because=f"Fibres turn with the body: {LEFT}.",

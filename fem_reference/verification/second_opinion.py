@@ -202,7 +202,8 @@ EXTENDED = "A block of Mooney-Rivlin material pulled to 1.3 times its length"
 LAGGED = Entry(
     name="lagged_factorisation",
     group="linear solvers",
-    title="Turned bar of muscle: largest difference of a node between lagged factorisations, in double precision, and direct ones",
+    title="Turned bar of muscle: largest difference of a nodal position between lagged factorisations, in double precision, and "
+    "direct ones",
     unit="mm",
     measure=difference,
     given={"solver": "lagged", "precision": "double"},
@@ -248,14 +249,15 @@ ENTRIES: tuple[Entry, ...] = (
     replace(
         LAGGED,
         name="lagged_factorisation_single",
-        title="Turned bar of muscle: largest difference of a node between lagged factorisations, in single precision, and direct "
-        "ones in double precision",
+        title="Turned bar of muscle: largest difference of a nodal position between lagged factorisations, in single precision, "
+        "and direct ones in double precision",
         given={"solver": "lagged", "precision": "single"},
     ),
     replace(
         LAGGED,
         name="multigrid",
-        title="Turned bar of muscle: largest difference of a node between multigrid (P2 and P1) and direct factorisations",
+        title="Turned bar of muscle: largest difference of a nodal position between multigrid (P2 and P1) and direct "
+        "factorisations",
         within=1e-8,
         given={"solver": "multigrid"},
     ),

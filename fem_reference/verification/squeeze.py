@@ -197,8 +197,8 @@ ENTRIES: tuple[Entry, ...] = (
     *(
         SMOOTH(
             name=f"squeeze_return_{name}",
-            title=f"Distance of a squeezed block from rest when the plates are back, K/mu = {bulk / MU:.0e}, {element}"
-            + (", in load steps that may grow" if growing else ""),
+            title="Block squeezed by plates that return to their start: largest distance of a node from its rest position, "
+            f"K/mu = {bulk / MU:.0e}, {element}" + (", in load steps that may grow" if growing else ""),
             unit="mm",
             measure=distance_from_rest,
             given={"element": element, "bulk": bulk, "growing": growing},

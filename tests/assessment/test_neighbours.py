@@ -54,13 +54,18 @@ def test_muscles_may_overlap_by_the_give_of_their_own_contact_alone() -> None:
         return [one.name for one in between(problem, run, lambda _: places) if not one.met]
 
     assert denied("ab", 0.09) == []  # 0.09 and 0.01, and 0.05 of an edge that bulges
-    assert denied("ab", 0.02) == ["a and b in each other"]  # at most 0.073
-    assert denied("bc", 0.09) == ["a and b in each other"]  # others that press each other are no excuse
+    assert denied("ab", 0.02) == ["penetration of a and b into each other"]  # at most 0.073
+    assert denied("bc", 0.09) == [
+        "penetration of a and b into each other"
+    ]  # others that press each other are no excuse
     assert len(denied("ab", 0.09, None)) == 3  # not known, so that none is met
     # Where contact was left out, as no two come near, nothing is allowed, in any of several frames.
     still = replace(problem, law=None, pairs=())
     run = Run("r", "fenicsx", Outcome("converged", ""), (0, 1), cube.surface, np.stack([cube.surface.points] * 2))
-    for lifted, lost in ((nodes, ["a and b in each other"]), (np.tile(mesh.points, (3, 1)) + 2 * lifts, [])):
+    for lifted, lost in (
+        (nodes, ["penetration of a and b into each other"]),
+        (np.tile(mesh.points, (3, 1)) + 2 * lifts, []),
+    ):
         assert [one.name for one in between(still, run, lambda _, places=lifted: places) if not one.met] == lost
 
 

@@ -58,7 +58,9 @@ def test_what_is_only_wrong_is_sound() -> None:
     for last in (MOVED[1], MOVED[1] + [5.0, 0, 0], MOVED[1] * 1.2, MOVED[1] * [1, 1, 0.6], REST.points + 1e-4):
         assert unsound(run(last), TRUTH) == ""
     frozen = run(REST.points)
-    assert unsound(frozen, TRUTH).startswith(f"stuck: {len(REST.points)} vertices never move, but by up to 3 mm")
+    assert unsound(frozen, TRUTH).startswith(
+        f"stuck: {len(REST.points)} vertices never move, although they move by up to 3 mm"
+    )
     assert unsound(frozen, run(REST.points + [1e-2, 0, 0])) == ""  # the reference rests too
     lost = run(MOVED[1] * NAN)
     assert unsound(lost, TRUTH) == unsound(run(MOVED[1] * 1e6), lost) == ""  # statuses and statistics say so

@@ -54,7 +54,7 @@ def test_a_run_without_states_is_not_solved_again_unless_asked(solved, capsys, t
     assert cli.main(words) == cli.BAD_INPUT
     said = capsys.readouterr().err
     assert "a reference that was solved without storing the states" in said
-    assert "want --solve, which solves it again (the last time in 22 min)" in said
+    assert "want --solve, which solves it again (last time this took 22 min)" in said
     assert not (tmp_path / "paraview").exists()
     assert cli.main([*words, "--solve"]) == cli.BROKEN  # it begins to, which the fixture forbids
     assert "it is solved again" in capsys.readouterr().err

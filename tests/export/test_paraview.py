@@ -213,7 +213,7 @@ def test_the_folder_must_be_free_and_options_fit_the_format(compared, tmp_path, 
     with pytest.raises(InputError, match="which is not empty"):
         paraview.write(compared[0], tmp_path)
     assert cli.main(["export", "box_squeeze", "--to", str(tmp_path / "to"), "--candidate", "pbd"]) == cli.BAD_INPUT
-    assert "these options for paraview only" in capsys.readouterr().err
+    assert "want none of them: they are for paraview only" in capsys.readouterr().err
 
 
 def test_blender_is_given_every_vertex_in_every_frame(compared, exported, tmp_path, monkeypatch) -> None:

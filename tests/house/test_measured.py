@@ -62,7 +62,8 @@ def test_what_is_kept_of_the_catalogue_passes() -> None:
 
 def test_hard_cases_are_counted_and_the_ends_of_load_steps_are_read() -> None:
     """A sentence as ``studies.hard.following.in_steps`` writes it, with a number of load steps that ended with a status."""
-    sentence = "unstable; end state at frame 5 by number of load steps: 1: 1.5e-13 % from that of 10, 40: out of steps"
+    apart = "1: 1.5e-13 % of the body's size from the end state with 10 load steps"
+    sentence = f"unstable; end state at frame 5 by number of load steps: {apart}, 40: out of steps"
     cells = [
         {"case": "twist", "solver": "fenicsx", "verdict": "ok", "sentence": sentence},
         {"case": "hip", "solver": "fenicsx", "verdict": "ok", "sentence": "volume 1 % at frame 3"},

@@ -187,7 +187,7 @@ def test_a_bone_between_the_vertices_of_a_coarse_surface_is_met() -> None:
     # 0.4 mm of its middle.
     assert_allclose(deepest.values, np.where(middle, 3, surface), atol=0.4)
     assert_allclose(deepest.values[~middle], surface[~middle], atol=0.03)
-    assert deepest.where[4] == "around the middle of ball"
+    assert deepest.where[4] == "near the centre of ball"
     whole = 4 / 3 * np.pi * 27
     assert_allclose(volume.values[4], whole, rtol=0.03)
     assert_allclose(volume.values[1], np.pi * 1**2 * (9 - 1) / 3, rtol=0.06)

@@ -118,12 +118,15 @@ def test_what_all_do_alike_is_no_travel_and_the_rest_is_bounded_by_the_size() ->
         ),
         (
             lambda points, frame: 0 * points + (2.0 if frame > 3 else 0),
-            r'"head": path at frame 3: got 3.464 mm up to frame 3, or a rotation by 0',
+            r'"head": path at frame 3: got movement by up to 3.464 mm and rotation by 0 rad by frame 3,',
         ),
         (lambda points, _: points[:, 0], r'"head": path at frame 0: got displacements \(4,\) of points \(4, 3\)'),
         (lambda points, _: points @ [1.0], r'"head": path at frame 0: got ValueError: matmul'),
         (Turn((0, 0, 1), 1e300), r'"head": path: got 1e\+300 rad of rotation, want at most 3927 rad'),
-        (Affine(STILL, (0.0, 0.0, 1e300)), r'"head": path at frame 0: got .* mm up to frame .*, want a path without'),
+        (
+            Affine(STILL, (0.0, 0.0, 1e300)),
+            r'"head": path at frame 0: got movement by up to .*, want a path without',
+        ),
     ],
 )
 def test_what_nobody_can_follow_is_refused(path, message) -> None:

@@ -30,7 +30,7 @@ def test_the_page_and_its_numbers(tmp_path) -> None:
         assert f"<th>{one.choice}<small>rms, mm</small></th>" in text
     # The first technique is given the least errors; 30 Gaussians are 120 numbers where 900 vertices are 2700.
     assert estimation_page.said(found()).startswith("Of the curves through a few points of a fibre, constant deviates")
-    assert "with 22 to 22 times fewer parameters" in estimation_page.said(found())
+    assert "with 1/22 to 1/22 of the parameters" in estimation_page.said(found())
 
 
 @pytest.mark.slow

@@ -124,7 +124,7 @@ def test_moved_with_both_its_bones_a_muscle_comes_to_rest_undeformed() -> None:
     # Swinging dies out with c / 2 m = 150 / s or more and 1.1 s are left: rounding of the forces.
     assert_allclose(frames[-1].surface, apply(turn.pose(5), given.surface.points), atol=1e-6)
     assert frames[-1].scalars["unbalanced_max"] < 1e-6
-    assert outcome.message.startswith("60 frame numbers, each of ")
+    assert outcome.message.startswith("60 frame numbers with ")
 
 
 @pytest.mark.slow
@@ -170,7 +170,7 @@ def test_bones_keep_masses_out() -> None:
 
 def test_cost() -> None:
     outcome, _ = solved(bar(BEND), time_step="1 ms", stiffness="0.001 N/mm")
-    assert outcome.message == "10 frame numbers, each of 20 steps of 0.001 s"
+    assert outcome.message == "10 frame numbers with 20 steps of 0.001 s each"
     assert outcome.cost["iterations"] == 10
     assert outcome.cost["time_steps"] == 200
     assert outcome.cost["threads"] == 1
@@ -198,7 +198,7 @@ def test_a_muscle_torn_apart_is_an_outcome() -> None:
 def test_a_muscle_spread_too_wide_is_an_outcome() -> None:
     outcome, _ = solved(bar(None), gravity="0, 0, -1e6 m/s^2", stiffness="0.001 N/mm", time_step="0.1 ms")
     assert outcome.status == "diverged"
-    assert "the muscle is spread over " in outcome.message
+    assert "the muscle extends over " in outcome.message
 
 
 def pressed(travel: float) -> MuscleProblem:
@@ -269,7 +269,7 @@ def test_the_stable_time_step_at_great_damping(damping) -> None:
 
 def test_another_clock_than_the_scenes_is_reported() -> None:
     outcome, _ = solved(replace(bar(BEND), interval=0.5))
-    assert outcome.message.endswith("; a frame number lasts 0.02 s in this solver, but 0.5 s in the scene")
+    assert outcome.message.endswith("; the time between frame numbers is 0.02 s in this solver, but 0.5 s in the scene")
     assert "the scene" not in solved(replace(bar(BEND), interval=0.02))[0].message
 
 

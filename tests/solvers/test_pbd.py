@@ -320,7 +320,7 @@ def test_a_body_torn_apart_is_an_outcome():
     leap = RigidMotion((1, 0, 0), (0, 1e5, 0), (0.0, 3.0, 4.0), (0.0, 0.0, 1.0))
     outcome, frames = run(attached_setup(leap, leap))
     assert outcome.status == "diverged"
-    assert outcome.message.startswith("frame 4: the muscle is spread over ")
+    assert outcome.message.startswith("frame 4: the muscle extends over ")
     assert list(frames) == [0, 1, 2, 3]
 
 

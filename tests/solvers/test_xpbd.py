@@ -332,7 +332,7 @@ def test_another_clock_than_the_scenes_is_reported():
     setup = muscle(None, last=2)
     printed = [run(replace(setup, interval=interval))[0].message for interval in (None, 0.01, 0.05)]
     assert printed == ["2 iterations"] * 2 + [
-        "2 iterations; a frame number lasts 0.01 s in this solver, but 0.05 s in the scene"
+        "2 iterations; the time between frame numbers is 0.01 s in this solver, but 0.05 s in the scene"
     ]
 
 

@@ -92,7 +92,7 @@ def test_validate_says_what_a_scene_is_and_costs(stl: Path, capsys) -> None:
     printed = capsys.readouterr().out
     assert "mine can be solved" in printed
     assert re.search(
-        r"motion: the distance from \w+ to \w+ is \d+(\.\d+)? mm at rest, and at most \d+ % (longer|shorter), in frame 20",
+        r"motion: the distance from \w+ to \w+ is \d+(\.\d+)? mm at rest, and at most \d+ % (longer|shorter), at frame 20",
         printed,
     )
     assert "of processor time, within a factor of three, for 11 frames" in printed

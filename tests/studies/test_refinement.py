@@ -221,7 +221,9 @@ def test_a_change_by_exact_attachments_that_cannot_be_solved_is_not_known(case, 
     scene = casefile.read_muscle(case, changes={"attachment[0].stiffness": "100 kPa/mm"})
     bench = Bench(scene, case.parent / "runs")
     bars = refinement.obtain(bench, bench.reference())
-    assert "error bar: the change by exact attachments is not known: error bar, exact attachments: got" in caplog.text
+    assert (
+        "error bar: the change due to exact attachments is not known: error bar, exact attachments: got" in caplog.text
+    )
     bar = refinement.stored(bench.reference()).find("change", "surface_deviation", "rms")
     assert np.isnan(bar.model).all()
     assert np.isfinite(bar.values).all()

@@ -174,4 +174,4 @@ def other_clock(setup: Setup, frame_time: float) -> str:
     """The end of a message if the interval of the scene differs from the ``frame_time`` [s] of a solver; otherwise empty."""
     if setup.interval is None or math.isclose(setup.interval, frame_time):
         return ""
-    return f"; a frame number lasts {frame_time:g} s in this solver, but {setup.interval:g} s in the scene"
+    return f"; the time between frame numbers is {frame_time:g} s in this solver, but {setup.interval:g} s in the scene"

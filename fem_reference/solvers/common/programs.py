@@ -124,7 +124,7 @@ class _Watch:
             if used >= self.limit:
                 self.overran = "timed out", f"ended after {self.limit:g} s of processor time, the time limit"
             elif passed >= CLOCK * self.limit:
-                why = f"it waited, or the machine was busy: {used:.3g} s of processor time in {passed:.3g} s"
+                why = f"it was waiting, or the machine was busy: {used:.3g} s of processor time in {passed:.3g} s"
                 self.overran = "stalled", why
             if self.overran is not None:
                 _kill(self.process)

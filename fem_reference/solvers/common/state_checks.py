@@ -55,7 +55,9 @@ class SurfaceCheck:
             return Trouble("diverged", f"the position of {len(lost)} points is not a number (first: point {lost[0]})")
         wide, apart = diagonal(state), diagonal(state[self.attached]) if len(self.attached) else 0.0
         if wide > _WIDE * max(self.width, apart):
-            return Trouble("diverged", f"the muscle is spread over {wide:.3g} mm, but {self.width:.3g} mm at rest")
+            return Trouble(
+                "diverged", f"the muscle extends over {wide:.3g} mm, compared with {self.width:.3g} mm at rest"
+            )
         ratio = enclosed_volume(state, self.rest.triangles) / self.volume
         if ratio <= 0:
             return Trouble("inverted", "the surface is turned inside out")

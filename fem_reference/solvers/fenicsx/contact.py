@@ -295,5 +295,5 @@ class ContactForces:
         if not excess.max(initial=0.0) > felt:
             return None
         worst = int(np.argmax(excess))
-        where = f"the point that rests at {place_of(self.points.rest[met[turned[worst]]])}"
+        where = f"the point whose rest position is {place_of(self.points.rest[met[turned[worst]]])}"
         return float(excess[worst]), f'{where} went through "{self.bones[i].name}"'

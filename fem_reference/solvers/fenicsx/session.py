@@ -38,7 +38,7 @@ class Session:
         """Solve for ``body`` and pass its frames to ``sink``. Raises InputError if element, ranks or solver do not suit it."""
         check(body, settings.element, settings.quadrature_degree)
         if body.touching and self.ranks > 1:
-            raise InputError("ranks", self.ranks, "1, as only then parts of the surface may touch")
+            raise InputError("ranks", self.ranks, "1, as touching parts are supported on one rank only")
         if body.touching and settings.linear_solver == "multigrid":
             want = "another solver, as multigrid does not support touching parts"
             raise InputError("linear_solver", '"multigrid"', want)

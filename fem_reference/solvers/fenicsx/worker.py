@@ -130,7 +130,7 @@ class Worker:
         most, own = (max(modes) for modes in zip(*self.unstable.values(), strict=True))
         return (
             f"; in {len(self.unstable)} of them the equilibrium is unstable, first at frame {min(self.unstable):g} "
-            f"(negative modes: up to {most:.0f}, of which the material has {own:.0f} for certain)"
+            f"(negative modes: up to {most:.0f}, at least {own:.0f} of them due to the material)"
         )
 
     def failure(self, reached: Step) -> tuple[Status, str]:
@@ -140,7 +140,7 @@ class Worker:
         self.ranges.add(reached.at, body.validity.examine(reached.at)[1])
         sentence = (
             f"{self.collapse or reached.last.detail} beyond frame {reached.at:.2f} "
-            f"with steps down to {self.settings.smallest_step}; "
+            f"with load steps down to {self.settings.smallest_step}; "
             f"in the last good state the smallest det F is {body.determinants.smallest()}"
             f"{f', and the deepest contact is {contact.deepest()}' if contact else ''}"
             f"{self.instability().replace('of them', 'of the frames reached')}{self.ranges}; "

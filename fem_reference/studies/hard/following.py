@@ -141,7 +141,8 @@ def in_steps(built: MechanicalProblem, choice: SolverChoice, steps: StepCounts) 
         return SameEnd(True, f"no number of load steps reaches frame {steps.until} ({', '.join(words)})")
     standard, size = ends[max(ends)], diagonal(built.rest.surface.points)
     off = {count: 100 * float(np.linalg.norm(end - standard, axis=1).max()) / size for count, end in ends.items()}
-    apart = [f"{count}: {share:.2g} % from that of {max(ends)}" for count, share in off.items() if count != max(ends)]
+    whence = f"% of the body's size from the end state with {max(ends)} load steps"
+    apart = [f"{count}: {share:.2g} {whence}" for count, share in off.items() if count != max(ends)]
     listed = ", ".join(apart + words) or "only one"
     return SameEnd(max(off.values()) <= SAME, f"end state at frame {steps.until} by number of load steps: {listed}")
 

@@ -191,7 +191,7 @@ def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
     histories = [(bound, health.history(followed, bound.quantity)) for bound in known]
     begins = followed.least_determinant
     if hard.start is not None and begins is not None and not begins[0] > 0:
-        said = f"the start has det F down to {begins[0]:.2g}, but this solver needs more than 0: {blank.status}"
+        said = f"det F is as low as {begins[0]:.2g} at the start, but this solver needs it above 0 ({blank.status})"
         return replace(blank, verdict="not applicable", sentence=said)
     if blank.status != "converged":
         return stress.unfinished(blank, message, histories, hard.no_solution)

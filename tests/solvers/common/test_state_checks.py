@@ -45,7 +45,7 @@ def test_what_may_be_a_muscle(points):
     ("points", "status", "sentence"),
     [
         (scaled(11, 0.1, 0.1), None, ""),  # the diagonal of the box is 11 / sqrt(3) = 6.4 times as long
-        (scaled(18, 0.1, 0.1), "diverged", "the muscle is spread over "),  # 10.4 times
+        (scaled(18, 0.1, 0.1), "diverged", "the muscle extends over "),  # 10.4 times
         (scaled(1.72, 1.72, 1.72), "diverged", "the surface encloses 5.09 times its volume at rest"),
         (scaled(1, 1, -1), "inverted", "the surface is turned inside out"),
         (scaled(1, 1, 0), "inverted", "the surface is turned inside out"),

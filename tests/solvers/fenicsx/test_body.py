@@ -201,5 +201,5 @@ def test_regions_are_on_the_boundary_of_the_cells(element) -> None:
     pressed = effect("pressure", on="lid", pressure="1 kPa", ramp=ONCE)
     with pytest.raises(InputError, match=r"facets\.lid: got facets that do not belong to one cell each \(1 of 1"):
         checked([lost], (*acting, pressed), ())
-    with pytest.raises(InputError, match=r"facets\.lid: got none, want facets of one cell each"):
+    with pytest.raises(InputError, match=r"facets\.lid: got none, want at least one facet on the boundary"):
         checked(every[:0])

@@ -158,7 +158,7 @@ def test_a_body_that_collapses_ends_as_collapsed(element, session) -> None:
     assert solved.outcome.status == "collapsed"
     assert [state.number for state in solved.states] == [0.0, 0.2, 0.3, 0.4]
     assert message.startswith("Newton's method converged, but 100 % of the body collapsed: V/V0 is 0.")
-    assert ", below 0.2 beyond frame 0.41 with steps down to 0.001; in the last good state" in message
+    assert ", below 0.2 beyond frame 0.41 with load steps down to 0.001; in the last good state" in message
     # At frame 0.2 J is 0.512; then 0.343, 0.216, and 0.2 in the last good state.
     law = "incompressible" if ELEMENTS[element][2] is not None else "incompressible_penalty"
     assert f"{law} is outside its range of validity in 3 of the states reached, first at frame 0.3" in message

@@ -74,7 +74,7 @@ def test_bodies_in_each_other_are_no_success_and_contact_keeps_them_apart() -> N
         apart, within = (running.cell(running.Posed(one), one.choice(choice)) for one in (hard, without))
     assert (apart.verdict, apart.quantity) == ("ok", "crossed")
     assert (within.verdict, within.status) == ("failed", "denied")
-    assert "block and narrow in each other: 0.6 mm in frame 4" in within.sentence
+    assert "penetration of block and narrow into each other: 0.6 mm in frame 4" in within.sentence
 
 
 @pytest.mark.slow
