@@ -50,9 +50,7 @@ class Worker:
         self.left: dict[float, float] = {}  # the perturbation [mm] in each frame that has one
         self.ranges = Ranges()
         self.exact = False  # True once linear systems are solved exactly, after a failure of Newton's method
-        self.collapse = (
-            ""  # the message of the latest attempt in which the body collapsed; empty if one has converged since
-        )
+        self.collapse = ""  # the message of the last collapse of the body; empty if an attempt has converged since
         self.earlier: dict[str, float] = {}  # the cost of earlier processes of this run
         self.restart = Restart(self.body, job.kept) if job.kept else None
 
