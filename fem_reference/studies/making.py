@@ -136,9 +136,7 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
     load = clock.load()
     used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()} | ({} if load is None else {LOAD: load})
-    outcome = replace(
-        outcome, cost=used | cost
-    )  # the solver's costs take precedence: they include processes of its own
+    outcome = replace(outcome, cost=used | cost)  # the solver's costs take precedence: they include its own processes
     if not writer.frames:
         rest = writer.rest
         writer.add(Frame(writer.state["frames"][0], rest.surface.points, rest.fibres.points if rest.fibres else None))
