@@ -16,8 +16,8 @@ class InSitu(Prestrain):
     ``e`` and ``p0``, so that the stress rotates with the body. ``e`` and ``p0`` are the strain and the pressure of an isotropic
     body under the forces at rest; the shear and bulk moduli of this body are the moduli at rest of the scene's effects. Of all
     stresses that balance these forces, this stress has the least energy. The isotropic body is supported by the springs of
-    attachments, which are extended at rest, and by the bones. A bone presses where the muscle touches it, or where the muscle is
-    within the distance ``support`` of the bone (see ``contact``), through the tissue in between.
+    attachments, which are extended at rest, and by the bones. A bone presses on the muscle where the two touch. With ``support``
+    (a key of ``contact``) it also presses where the gap is at most ``support``, because the tissue in the gap transmits pressure.
 
     ``stretch``: dimensionless; above 1 if fibres are taut at rest, 1 if only an activation acts at rest. Source: Maas, Erdemir,
     Halloran and Weiss 2016, doi 10.1016/j.jmbbm.2016.04.012, who iterate to a prestrain that is in equilibrium with this stretch.
@@ -33,7 +33,7 @@ class InSitu(Prestrain):
 
 
 def among(acting: Iterable[object]) -> InSitu | None:
-    """The first effect of tension at rest in ``acting``; None if there is none."""
+    """The first of the effects ``acting`` that is tension at rest (``in_situ``); None if there is none."""
     return next((effect for effect in acting if isinstance(effect, InSitu)), None)
 
 

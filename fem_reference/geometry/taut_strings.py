@@ -1,4 +1,4 @@
-"""Taut strings of points around obstacles, which approximate the shortest paths and show which obstacles these touch."""
+"""Taut strings of points around obstacles. They approximate the shortest paths and show which obstacles the paths touch."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -22,7 +22,7 @@ def taut(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Fl
     """Points (n, N, 3) of n strings that are nearly taut: each point is at the midpoint of its neighbours or on an obstacle."""
     rings = [one for one in obstacles if isinstance(one, Ring)]
     string = _piecewise([starts, *(ring.through(starts, ends) for ring in rings), ends])
-    # Points are moved aside slightly, because from the centre of an obstacle no direction leads out of it.
+    # Points are moved aside slightly, because the outward direction is undefined at the centre of an obstacle.
     aside = 1e-6 * np.cross(ends - starts, np.eye(3)[np.argmin(np.abs(ends - starts), axis=1)])
     string[:, 1:-1] += aside[:, None]
     for ring in rings:  # no piece may slip past the tube
@@ -39,7 +39,7 @@ def taut(obstacles: Sequence[SmoothSurface], starts: Floats, ends: Floats) -> Fl
 
 
 def _piecewise(stations: list[Floats]) -> Floats:
-    """Points (n, N, 3) on the straight lines through ``stations``, points (n, 3) of n strings."""
+    """Points (n, N, 3) of n strings, on the straight segments between successive ``stations``: one point of each string (n, 3)."""
     shares = (np.arange(_PIECES) / _PIECES)[:, None]
     parts = [one[:, None] + shares * (other - one)[:, None] for one, other in pairwise(stations)]
     return np.concatenate([*parts, stations[-1][:, None]], axis=1)
@@ -53,8 +53,8 @@ def halved(string: Floats) -> Floats:
 
 
 def touching(obstacle: SmoothSurface, string: Floats) -> Flags:
-    """Mask (n, N) of the points of strings that may touch an obstacle: those nearer to it than a tangent line is at a distance of a
-    third of a piece from the point of tangency.
+    """Mask (n, N) of the points of a halved ``string`` that may touch an obstacle: those whose gap to it is no larger than the
+    gap of a tangent line a third of a piece away from the point of tangency. The pieces are those before the string was halved.
     """
     value, slope = obstacle.level(string.reshape(-1, 3))
     away = (value / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)).reshape(string.shape[:2])

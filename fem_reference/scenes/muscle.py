@@ -111,8 +111,8 @@ class Rod(Record):
 
 
 class CaseBone(Record):
-    """A rigid body: a ``surface`` file with coordinates in ``unit``, or exactly one of the closed forms (``half_space``, ``box``,
-    ``sphere``, ``capsule``, ``cylinder``). Without a ``motion`` the bone is fixed.
+    """A rigid body: a ``surface`` file with coordinates in ``unit``, or exactly one of the analytic shapes (``half_space``,
+    ``box``, ``sphere``, ``capsule``, ``cylinder``). Without a ``motion`` the bone is fixed.
 
     ``distance_error``: the allowed root-mean-square error of the distance near the surface, before it is smoothed.
     ``distance_rounding``: the standard deviation of the Gaussian filter that smooths it, because sharp edges hinder sliding.

@@ -54,10 +54,10 @@ class Wanted:
         now, then = versions(), run.origin.get("versions", {})
         other = [name for name in now if name in then and now[name] != then[name] and name != "python"]
         if other:
-            log.info("%s: solved before, but with another %s; solving again", self.name, other[0])
+            log.info("%s: solved before, but with another version of %s; solving again", self.name, other[0])
             return None
         if getattr(self.settings, "store_state", None) and not states.are_kept(self.folder, run.numbers):
-            log.info("%s: solved before without its states; solving again", self.name)
+            log.info("%s: solved before, but its states were not stored; solving again", self.name)
             return None
         log.info("%s: solved before, taken from %s", self.name, self.folder)
         return replace(run, name=self.name)
@@ -90,7 +90,7 @@ def bars_kept(folder: Path) -> Iterator[None]:
 
 
 def seen(watch: Watch, folder: Path, numbers: Sequence[float]) -> Iterator[tuple[Decision, ...]]:
-    """Show ``watch`` the frames ``numbers`` stored in a ``folder`` again, and yield the effects that matter at each frame."""
+    """Show ``watch`` again the frames with these ``numbers``, stored in ``folder``; yield the effects that matter at each."""
     watch.frames.clear()
     for number in numbers:
         yield watch.see(number, *places(folder, number))
@@ -136,7 +136,7 @@ def write(writer: Writer, solve: Callable[[Sink], Outcome], watch: Watch | None,
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
     load = clock.load()
     used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()} | ({} if load is None else {LOAD: load})
-    outcome = replace(outcome, cost=used | cost)  # a solver with processes of its own states the costs of these
+    outcome = replace(outcome, cost=used | cost)  # the solver's costs take precedence: they include its own processes
     if not writer.frames:
         rest = writer.rest
         writer.add(Frame(writer.state["frames"][0], rest.surface.points, rest.fibres.points if rest.fibres else None))

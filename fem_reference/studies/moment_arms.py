@@ -1,4 +1,4 @@
-"""Hip moment arms of the reference's fibres compared with published ones, on the report's anatomy and coarse meshes."""
+"""Hip moment arms of the reference's fibres, on coarse meshes of the report's anatomy, compared with published ones."""
 
 import csv
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from fem_reference.studies.campaign import each
 from fem_reference.studies.execution import Bench
 
 LARGER = 1.25  # a second run with tetrahedra larger by this factor shows the dependence of moment arms on the mesh
-_EVERY, _RAD = 10, 100  # the difference of successive frame numbers, and of those before and after a rotation by 1 rad
+_EVERY, _RAD = 10, 100  # differences of frame numbers: between successive frames, and over a rotation by 1 rad
 NEMETH, BLEMKER = "nemeth_1985", "blemker_delp_2005"
 # Ranges of flexion [rad]: that of the shipped cases, and about -10 to 90 degrees; a run that fails to converge ends earlier.
 SHIPPED, WIDE = (0.0, 1.0), (-0.2, 1.6)
@@ -131,11 +131,13 @@ def published(scene: MuscleCase, experiment: str, muscle: str) -> ArmRange:
         angles, arms = (np.array([float(row[key]) for row in rows]) for key in columns)
         return ArmRange(angles, arms, arms)
     except (KeyError, ValueError) as error:
-        raise InputError(str(path), repr(error), "columns of angles and moment arms, in numbers") from None
+        raise InputError(str(path), repr(error), "numeric columns of angles and moment arms") from None
 
 
 def _envelope(rows: list[dict[str, str]], muscle: str) -> ArmRange:
-    """The range [mm] of moment arms from the ``rows`` of a file in cm, at the angles of both bounds within their common range."""
+    """The range [mm] of moment arms in the ``rows`` of a file, which are in cm. Its angles are those of the lower and of the upper
+    bound, as far as both bounds cover them.
+    """
     sides = {}
     for bound in ("lower", "upper"):
         side = [row for row in rows if (row["muscle"], row["bound"]) == (muscle, bound)]

@@ -25,7 +25,9 @@ CASES = (
 
 
 def stake(scenes: Iterable[MuscleCase], store: Path) -> Claims:
-    """Claims of error bars for the reference of each of ``scenes``, with true errors. Runs missing in ``store`` are solved."""
+    """The claims for the reference of each of ``scenes``: each is an error bar paired with the true error. Runs that are not in
+    ``store`` are solved.
+    """
     named = {scene.name: scene for scene in scenes}
     found, missing = each(named, partial(_of, store=store))
     why = "its reference, or the finer solution, did not reach all frames"
@@ -50,7 +52,9 @@ def _of(case: MuscleCase, store: Path) -> list[Claim]:
 
 
 def claims_of(case: str, bars: ErrorBars, runs: tuple[Run, Run], context: MeasurementContext) -> list[Claim]:
-    """Claims of ``bars`` about changes from rest and deviations of the first run; the second run is more accurate."""
+    """The claims of the first run: its error ``bars`` of changes from rest and of deviations, each paired with the true error,
+    the difference from the second, more accurate run.
+    """
     names = dict.fromkeys(metric for metric, _ in CLAIMED)
     changes = [change(one, context, names) for one in runs]
     surfaces = [as_surface(one) for one in runs]

@@ -71,7 +71,7 @@ def top(pressures: Pressures) -> float:
 
 
 def pressed(lab: Lab, n: int, mu: float) -> float:
-    """The mean stretch of the sphere's inner face, over its nodes, under a fluid with the pressure PRESSED inside."""
+    """The stretch of the sphere's inner face, averaged over its nodes. A fluid inside the sphere has the pressure PRESSED."""
     mesh = shapes.sphere_octant(INNER, OUTER, n, 2 * n, "tetrahedron", 2)
     fluid = make("pressure", on="inner", pressure=f"{PRESSED} MPa", ramp=ramp())
     body = Body(mesh, (*neo_hooke(mu, BULK), fluid), SYMMETRY, (0.0, 1.0))
@@ -100,7 +100,7 @@ def tube_force(lab: Lab, n: int, **given: Any) -> float:
 
 
 def sheathed(lab: Lab, n: int, thickness: float, element: str) -> float:
-    """The mean stretch of the inner face of a soft sphere with a membrane of ``thickness`` [mm] on it, under pressure."""
+    """The mean stretch of the inner face of a soft sphere under pressure. A membrane of ``thickness`` [mm] lines this face."""
     mesh = shapes.sphere_octant(INNER, OUTER, n, n, ELEMENTS[element][0], 2)
     membrane = make("membrane", on="inner", thickness=thickness, mu=MU)
     fluid = make("pressure", on="inner", pressure=SHEATHED, ramp=ramp())
@@ -239,7 +239,8 @@ ENTRIES: tuple[Entry, ...] = (
         **RISING,
         truth=lambda: TRUE_SPHERE.limit_point()[1] - TRUE_SPHERE.pressure(BEYOND),
         within=2e-3,
-        because="the drop is 4 % of pressures whose errors of 1e-4 largely cancel: 2e-4 remain (Q2/Q1, 4 cells through the wall)",
+        because="the drop is 4 % of the pressures, whose relative errors of 1e-4 largely cancel: the relative error of the drop is "
+        "2e-4 (Q2/Q1, 4 cells through the wall)",
         slow=True,
     ),
     FINITE(

@@ -63,7 +63,8 @@ ALIGNED = Entry(
     truth=partial(truth, 0.0),
     relative=True,
     within=1e-10,
-    because="The element represents displacements that are linear in each part; the residual of 1e-11 N remains, at 0.15 N.",
+    because="The element represents displacements that are linear in each part; only the residual of 1e-11 N remains "
+    "(the force is 0.15 N).",
     kind="closed form",
     source="Equal nominal stress in both parts (validation/series.py).",
 )

@@ -80,7 +80,7 @@ def test_asking_for_states_changes_no_key_and_solves_only_what_has_none(solved, 
     said = list[str]()
     with pytest.raises(AssertionError, match="it is solved again"):
         fr.solve(case, store=tmp_path / "out" / "runs", progress=said.append)
-    assert any("solved before without its states; solving again" in line for line in said)
+    assert any("solved before, but its states were not stored; solving again" in line for line in said)
     solved(kept=(0, 5, 10, 15, 20))
     for one in (case, plain, fr.load_case(tmp_path / "bar", {"reference.store_state": False})):
         assert fr.solve(one, store=tmp_path / "out" / "runs").outcome.status == "converged"

@@ -57,7 +57,7 @@ def test_a_run_made_with_other_packages_is_made_again(tmp_path, monkeypatch, cap
     now = making.versions()
     monkeypatch.setattr(making, "versions", lambda: now | {"numba": "0"})
     made.obtain("pbd", made.scene.candidate[0], "candidate[0]")
-    assert "solved before, but with another numba" in caplog.text
+    assert "solved before, but with another version of numba" in caplog.text
     # What is not installed here cannot be compared: stored runs are judged where no solver is.
     monkeypatch.setattr(making, "versions", lambda: {"numpy": now["numpy"]})
     caplog.clear()

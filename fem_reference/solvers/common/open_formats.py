@@ -85,7 +85,7 @@ def facts(problem: MuscleProblem) -> dict[str, Any]:
         "units": UNITS,
         "conventions": CONVENTIONS,
         "frames": list(problem.frames),
-        "interval": {"value": problem.interval, "unit": "s", "of": "the time between successive frame numbers"},
+        "interval": {"value": problem.interval, "unit": "s", "of": "the time from frame number n to n + 1"},
         "bones": bones,
         "attachments": [
             {"name": attached.attachment, "bone": attached.bone.name, "stiffness": attached.stiffness, "unit": "MPa/mm"}
@@ -98,7 +98,7 @@ def facts(problem: MuscleProblem) -> dict[str, Any]:
 
 
 def _bone(bone: Bone) -> dict[str, Any]:
-    """The facts about a bone: the name, the closed form if there is one, the motion, and the errors of distances to it [mm]."""
+    """The facts about a bone: the name, the analytic shape if there is one, the motion, and the errors of distances to it [mm]."""
     form = {name: asdict(bone.solid) for name, form in CLOSED_FORMS.items() if isinstance(bone.solid, form)}
     found: dict[str, Any] = {"name": bone.name, **form}
     if (motion := bone.motion) is not None:

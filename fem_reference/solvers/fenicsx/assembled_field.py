@@ -13,7 +13,7 @@ from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx.dolfinx_door import PETSc
 
-import basix  # isort: skip - after the door
+import basix  # isort: skip - after dolfinx_door
 import basix.ufl  # isort: skip
 import ufl  # isort: skip
 from dolfinx import fem, mesh  # isort: skip

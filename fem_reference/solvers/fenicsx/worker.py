@@ -12,11 +12,11 @@ from fem_reference.foundations.subprocesses import end_with_starter, forget_peak
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.contents import Status
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.solvers.fenicsx import dolfinx_door  # noqa: F401 - has to be first
+from fem_reference.solvers.fenicsx import dolfinx_door  # noqa: F401 - must be imported before the packages below
 from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.solvers.fenicsx.processes import MARK
 
-from mpi4py import MPI  # isort: skip - after the door
+from mpi4py import MPI  # isort: skip - after dolfinx_door
 from fem_reference.solvers.fenicsx import compiling, assembled_field  # isort: skip
 from fem_reference.solvers.fenicsx.body import AssembledBody  # isort: skip
 from fem_reference.solvers.fenicsx.modes import ahead, leave  # isort: skip
@@ -50,7 +50,7 @@ class Worker:
         self.left: dict[float, float] = {}  # the perturbation [mm] in each frame that has one
         self.ranges = Ranges()
         self.exact = False  # True once linear systems are solved exactly, after a failure of Newton's method
-        self.collapse = ""  # the message of the attempt, since the last good state, in which the body collapsed
+        self.collapse = ""  # the message of the last collapse of the body; empty if an attempt has converged since
         self.earlier: dict[str, float] = {}  # the cost of earlier processes of this run
         self.restart = Restart(self.body, job.kept) if job.kept else None
 
@@ -105,11 +105,11 @@ class Worker:
         return other
 
     def departures(self) -> str:
-        """A note on unstable equilibria that the run has left by a perturbation; empty if there are none."""
+        """A note on unstable equilibria from which a perturbation moved the run away; empty if there are none."""
         if not self.left:
             return ""
         return (
-            f"; in {len(self.left)} of them an unstable equilibrium was left along its lowest mode, "
+            f"; in {len(self.left)} of them the run moved off an unstable equilibrium along its lowest mode, "
             f"first at frame {min(self.left):g}, by a perturbation of up to {max(self.left.values()):.3g} mm"
         )
 
