@@ -219,7 +219,7 @@ class Case(Record):
         return [self.model_dump(include={*self.determined_by, "choice"}), self.effects, solved]
 
     def determining(self) -> dict[str, Any]:
-        """The keys that determine the solution and their values, without the effects."""
+        """The keys that determine the solution, with their values but without the effects."""
         return self.model_dump(mode="json", include=set(self.determined_by))
 
     @property

@@ -111,11 +111,11 @@ class Rod(Record):
 
 
 class CaseBone(Record):
-    """A rigid body: a ``surface`` file with coordinates in ``unit``, or exactly one of the closed forms (``half_space``, ``box``,
+    """A rigid body: a ``surface`` file with coordinates in ``unit``, or exactly one analytic shape (``half_space``, ``box``,
     ``sphere``, ``capsule``, ``cylinder``). Without a ``motion`` the bone is fixed.
 
-    ``distance_error``: the allowed root-mean-square error of the distance near the surface, before it is smoothed.
-    ``distance_rounding``: the standard deviation of the Gaussian filter that smooths it, because sharp edges hinder sliding.
+    ``distance_error``: the allowed root-mean-square error of the distance near the surface, before the distance is smoothed.
+    ``distance_rounding``: the standard deviation of the Gaussian filter that smooths the distance, as sharp edges hinder sliding.
     """
 
     name: Name
@@ -167,7 +167,7 @@ class Muscle(Record):
 
 
 class VertexList(Record):
-    """Vertices, numbered from 0, in a CSV ``file`` with lines ``vertex[,value]``; with a ``value``, only lines with this value."""
+    """Vertices, numbered from 0, in a CSV ``file`` with lines ``vertex[,value]``; if ``value`` is given, only those with it."""
 
     file: str
     value: int | None = None
