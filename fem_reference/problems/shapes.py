@@ -245,7 +245,7 @@ def cylinder(radius: float, length: float, rings: int, slices: int, kind: Kind, 
 
 
 def _in_ventricle(disc: Floats) -> Floats:
-    """Points (n, 3) [mm] of the ventricle's wall, from x and y in the unit disc, whose rim is the base, and the relative depth."""
+    """Points (n, 3) [mm] of the ventricle's wall. ``disc``: x and y in the unit disc, whose rim is the base, and relative depth."""
     depth = _WALL * disc[:, 2]
     short, long = _SHORT + depth, _LONG + depth
     radius = np.hypot(disc[:, 0], disc[:, 1])

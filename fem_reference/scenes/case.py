@@ -238,7 +238,7 @@ class Case(Record):
 
 
 def _exists(path: Path) -> bool:
-    """True if the file or folder exists; False also for text that cannot be a path."""
+    """True if the file or folder exists; False if it does not, or if its name cannot be a path."""
     try:
         return path.exists()
     except (OSError, ValueError):  # a name that is too long or contains a null character
