@@ -1,4 +1,4 @@
-"""Effects: each has a file of its own, whose name is used in scene files. A problem is the sum of its effects and nothing else.
+"""Effects: each has a file of its own, by whose name scene files refer to it. A problem is the sum of its effects and nothing else.
 
 Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters with one expression, written only
 with operators and the functions of ``Functions``. A solver can therefore use the expression symbolically, and a test can evaluate
@@ -65,17 +65,17 @@ class Effect(Record):
 
     def resultant(self, shape: Shape) -> Wrench | None:  # noqa: ARG002
         """The force and moment of the effect on an entire body of this ``shape``, for an amount of 1. None if they are unknown, or
-        depend on more than the shape, such as velocities within a load step.
+        if they depend on more than the shape, for example on the velocities within a load step.
         """
         return None if self.outer else Wrench(np.zeros(3), np.zeros(3))
 
     def indicator(self, scene: Estimates) -> Indicator | None:  # noqa: ARG002
-        """An estimate, before solving, of the influence of the effect; None for a part of the material that is always needed."""
+        """An estimate, before solving, of the influence of the effect; None if it is part of the material and always needed."""
         return None
 
     @property
     def title(self) -> str:
-        """The name of the class with the part of the surface and the region, as a scene may have several effects of one class."""
+        """The class name, with part of the surface and region if stated, as a scene may have several effects of one class."""
         on = getattr(self, "on", "")
         return (
             type(self).__name__ + (f" on {on}" if on else "") + (f" in {region}" if (region := region_of(self)) else "")
@@ -210,7 +210,9 @@ class Prestrain(Effect):
 
 
 def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
-    """The ``state`` with the F that energies depend on: its elastic part if ``acting``, pairs (effect, amount), has a prestrain."""
+    """The ``state`` with the F on which the energies depend: the elastic part of the given F if ``acting``, pairs (effect, amount),
+    has a prestrain.
+    """
     for effect, amount in acting:
         if isinstance(effect, Prestrain):
             now, before = (effect.elastic(replace(state, F=F, amount=amount)) for F in (state.F, state.F_before))

@@ -8,7 +8,7 @@ from pydantic import Field
 from fem_reference.effects import Energy, Moduli, State
 from fem_reference.foundations.units import PositivePressure
 
-# Cosines of ``2 angle`` for values spread evenly from 0 to pi; Python floats, because numpy floats would turn symbols into arrays.
+# Cosines of values of ``2 angle`` spread evenly from 0 to pi; Python floats, because numpy floats would turn symbols into arrays.
 _DIRECTIONS = 8
 COSINES = [float(np.cos((j + 0.5) * np.pi / _DIRECTIONS)) for j in range(_DIRECTIONS)]
 # The square root has no derivative at 0, so this fraction of the squared mean is added to the squared spread.
@@ -16,7 +16,7 @@ _ROUNDING = 1e-13
 
 
 class CollagenAcross(Energy):
-    """The mean, over all directions a perpendicular to the fibre, of ``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` if
+    """The mean, over all directions ``a`` perpendicular to the fibre, of ``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` if
     ``I = J^(-2/3) a . C a`` is above 1, and of 0 otherwise.
 
     ``k1`` [MPa]; ``k2`` dimensionless. In the plane perpendicular to the fibre, I is ``mean + spread cos(2 angle)``, where ``mean``

@@ -18,9 +18,9 @@ class Contact(Interaction):
 
     ``stiffness`` [MPa/mm]: under the pressure p the surface penetrates the bone by at most p / stiffness. ``smoothing`` [mm]: the
     distance at which contact begins. ``bones``: the names of the bones, by default all. ``support`` [mm], only with ``in_situ``:
-    the distance within which a bone may press at rest, through tissue that is not meshed, such as a capsule or a bursa; by default
-    a bone presses only where the muscle touches it. ``friction``: the coefficient of Coulomb's law, greater than 0; without it
-    contact is frictionless.
+    the distance within which a bone may press on the muscle at rest, through tissue that is not meshed, such as a capsule or a
+    bursa; by default a bone presses on the muscle only where they touch. ``friction``: the coefficient of Coulomb's law, greater
+    than 0; without it contact is frictionless.
     """
 
     example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm", "bones": ["femur"]}

@@ -26,7 +26,7 @@ class Damping(Energy):
     coefficient: VolumeDamping
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """The distance by which drag makes the muscle lag behind its motion without drag.
+        """The distance by which the muscle lags, due to drag, behind the motion that it would have without drag.
 
         The estimate is the deflection of a beam under transverse drag plus the axial displacement of a bar under axial drag.
         """

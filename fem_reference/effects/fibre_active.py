@@ -1,4 +1,4 @@
-"""Active muscle fibres: a tension due to activation, which is maximal at the optimal fibre length."""
+"""Active muscle fibres: a tension that is due to activation and is maximal at the optimal fibre length."""
 
 from typing import Any, ClassVar
 
@@ -49,7 +49,7 @@ class FibreActive(Ramped, Energy):
 
 
 def _area(stretch: Any, state: State) -> Any:
-    """The integral of g from 1 to ``stretch``: the outer pieces cancel at 1, as g is symmetric about 1."""
+    """The integral of g from 1 to ``stretch``. At 1 the terms of the outer pieces cancel, as g is symmetric about 1."""
     rising = state.between(0.4, 0.6, stretch) - 0.4
     middle = state.between(0.6, 1.4, stretch) - 1
     falling = state.between(1.4, 1.6, stretch) - 1.6

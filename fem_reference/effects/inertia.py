@@ -11,7 +11,7 @@ from fem_reference.foundations.units import Density
 
 
 class Inertia(Energy):
-    """A force per unit rest volume of ``-density a``, where a is the acceleration, integrated by an implicit second-order method.
+    """A force ``-density a`` per unit rest volume, where a is the acceleration, integrated by an implicit second-order method.
 
     The method is the member of the generalised-alpha family that evaluates stresses at the end of a step (Wood, Bossak and
     Zienkiewicz 1980, doi 10.1002/nme.1620151011; Chung and Hulbert 1993, doi 10.1115/1.2900803, with alpha_f = 0):

@@ -1,4 +1,4 @@
-"""Membranes on the surface that resist stretch but not bending, such as aponeuroses and fasciae."""
+"""Membranes on the surface, such as aponeuroses and fasciae, which resist stretch but not bending."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar
@@ -17,8 +17,8 @@ class Membrane(Load):
     ``on``: the part of the surface; ``in``: an optional region, whose share weights the energy and is linear between the vertices
     of cells; ``thickness``: h at rest [mm]; ``mu``: the shear modulus at rest [MPa].
 
-    If the sheet is stretched by l in all directions, its tension per unit of present length is ``h mu (1 - l^-6)``. A real sheet
-    wrinkles in compression; this sheet resists compression, as if the tissue below kept it flat.
+    If the sheet is stretched by the factor l in all directions, its tension per unit of present length is ``h mu (1 - l^-6)``. A
+    real sheet wrinkles in compression; this sheet resists compression, as if the tissue below kept it flat.
     """
 
     outer: ClassVar[bool] = False

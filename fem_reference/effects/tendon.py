@@ -1,4 +1,4 @@
-"""Straight tendons that connect the muscle to a bone beyond it, such as the iliotibial tract."""
+"""Straight tendons, such as the iliotibial tract, that connect the muscle to a bone beyond it."""
 
 from typing import Any, ClassVar
 

@@ -42,5 +42,5 @@ class Viscosity(Energy):
         grown = [[now[i][k] - then[i][k] for k in range(3)] for i in range(3)]
         half = [[sum(axes[i][k] * grown[k][m] for k in range(3)) for m in range(3)] for i in range(3)]
         strain = [[sum(half[i][m] * axes[j][m] for m in range(3)) for j in range(3)] for i in range(3)]
-        square = sum(entry**2 for row in strain for entry in row)  # of 2 J_before^2 e
+        square = sum(entry**2 for row in strain for entry in row)  # the squared norm of 2 J_before^2 e
         return self.eta / 4 * state.rate * square / before.J**3

@@ -241,7 +241,7 @@ def _along_field(mesh: TetMesh, asked: Traced, count: int) -> tuple[Polylines, D
 
 
 def field_mesh(surface: Surface, fill: Callable[[float], TetMesh]) -> TetMesh:
-    """The tetrahedra for fields between attachments. ``fill``: a function that fills ``surface`` with tetrahedra of a size [mm]."""
+    """The tetrahedra for fields between attachments. ``fill``: as in ``lines_of``."""
     return fill(float(np.cbrt(6 * np.sqrt(2) * enclosed_volume(surface.points, surface.triangles) / TETS)))
 
 

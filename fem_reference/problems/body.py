@@ -131,7 +131,7 @@ class Cells:
     facets: dict[str, Ints]
 
     def places(self) -> Iterator[Floats]:
-        """Yield points (m, 3) [mm], one in each cell, at which fields are checked: the centres, then points near each node."""
+        """Yield places (m, 3) [mm] for checks of fields, one in each cell: first the centres, then points near each node."""
         nodes = self.points[self.cells]
         middles = nodes.mean(axis=1)
         yield middles
@@ -197,8 +197,8 @@ class Body:
     A load acts on the facets of the region that its ``on`` names. ``contact``: the law of contact with all ``bones``, None without
     contact. ``touching``: the laws of contact between parts of the surface. ``interval`` [s]: the time between consecutive frame
     numbers, None if nothing depends on time. ``start``: a function from rest points (n, 3) to their positions at ``frames[0]``.
-    ``regions``: the regions in which effects act, by name. ``within``: the ranges of cells to which
-    regions in one of several pieces of the mesh are limited, by the name of the region.
+    ``regions``: the regions in which effects act, by name. ``within``: for regions in only one of
+    several pieces of the mesh, the range of cells to which each is limited, by the name of the region.
     """
 
     mesh: Cells

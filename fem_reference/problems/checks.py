@@ -30,7 +30,7 @@ _FARTHEST = 1e9  # the maximum distance [mm] of a point from the origin
 _MOST = 100_000  # the maximum number of frames
 _MOST_CELLS = 10_000_000  # the maximum number of cells of a box
 _SHORTEST, _LONGEST = 1e-6, 1e6  # the minimum edge of a box [mm], and the maximum ratio of two edges
-_THINNEST = 1e6  # the limit of length / thickness of a cell; the ratio of stiffnesses, its square, must suit doubles
+_THINNEST = 1e6  # the limit of length / thickness of a cell; stiffnesses then differ by up to 1e12, its square
 
 
 def check(body: Body, element: str, quadrature_degree: int | None = None) -> None:

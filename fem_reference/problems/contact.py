@@ -101,7 +101,7 @@ def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: flo
     """The smallest gap (n,) [mm], negative inside, between a ``bone`` in its rest pose and each of n straight paths.
 
     ``starts`` (n, 3) [mm]: the first points of the paths; ``paths`` (n, 3) [mm]: the vectors from the first to the last points. The
-    gap is sampled at intervals that are as long as it allows, and at least ``least`` [mm] long.
+    gap is sampled at intervals that are as long as the last sampled gap allows, and at least ``least`` [mm] long.
     """
     smallest = np.full(len(starts), np.inf)
     lengths = np.linalg.norm(paths, axis=1)
@@ -111,7 +111,7 @@ def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: flo
         shares = walked[going] / np.maximum(lengths[going], least)
         gaps = bone.shape.sample(starts[going] + shares[:, None] * paths[going]).distance
         smallest[going] = np.minimum(smallest[going], gaps)
-        # The gradient of a sampled distance has length 1 to within a tenth; beyond the grid of the distance, strides are short.
+        # The gradient of a sampled distance has length 1 to within a tenth; beyond its grid, strides are 1 mm long.
         walked[going] += np.where(gaps < FAR, np.maximum(0.9 * np.abs(gaps), least), 1.0)
         going = going[walked[going] < lengths[going]]
     return smallest

@@ -21,9 +21,9 @@ from fem_reference.scenes.muscle import MuscleCase
 # displacement (travel) of the surface if this is smaller. Error bars of the surface (rms) are 0.03 to 0.14 of the size and 0.01 to
 # 0.05 of the travel. If an effect changes only fibre lengths and volumes, their error bars are smaller.
 TOLERANCE = 0.005
-# The maximum negligible stress of an effect, relative to that of the others, and the minimum strain assumed for the others.
+# The maximum negligible stress of an effect, relative to that of the other effects, and the minimum strain assumed for these.
 STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
-# The assumed error of the guessed position of a point, as a fraction of its path past a bone (actually 0.83 in `hip_flexion`).
+# The assumed error of the guessed position of a point, as a fraction of its path past a bone (actual error in `hip_flexion`: 0.83).
 _DOUBT = 1.0
 # The numbers of sampled frames, evenly spread, and of sampled vertices.
 _FRAMES, _VERTICES = 9, 1500
@@ -35,7 +35,7 @@ _FELT = 1.0  # a distance [mm] from a bone that exceeds any smoothing of contact
 
 @dataclass(frozen=True)
 class Decision:
-    """The decision on whether an ``effect`` is ``needed``. ``indicator``: the estimates for the effect, None for a part of the
+    """The decision on whether an ``effect`` is ``needed``. ``indicator``: the estimates for the effect, None if it is part of the
     material; ``bound`` [mm], ``stress_bound`` [MPa]: their allowed values. ``turned_out``: the frame whose solution showed that the
     effect is needed, None if estimates showed it. ``listed``: True if the effect acts whether it is needed or not. ``of``: the name
     of the muscle if the effect acts in only one of several muscles, otherwise empty.

@@ -22,11 +22,11 @@ SIDES = ("first", "last")  # the ends of a fibre
 class FibreEnds:
     """The first and the last end of each of k fibres.
 
-    ``attached``: the a attachments of the muscle. ``by`` (k, 2): the index in ``attached`` of the attachment to which each end
+    ``attached``: the attachments of the muscle. ``by`` (k, 2): the index in ``attached`` of the attachment to which each end
     belongs. ``distance`` (k, 2) [mm]: the distance of each end from its attached area at rest; ``closest`` (k, 2, 3) [mm]: the
-    closest point of this area. ``covered`` (a,): the fraction of the area of each attachment that is nearer than the mean fibre
-    spacing, sqrt(area / k), to an end that belongs to it. An end that does not reach its attachment continues as the tendon of the
-    attachment, if it has one.
+    closest point of this area. ``covered``: for each attachment, the fraction of its area that is within the mean fibre spacing,
+    sqrt(area / k), of an end that belongs to it. An end that does not reach its attachment continues as the tendon of the
+    attachment, if the attachment has one.
     """
 
     attached: tuple[AttachedVertices, ...]
@@ -173,6 +173,6 @@ def _covered(part: Floats, ends: Floats, fibres: int) -> float:
 
 
 def _nearest(exempt: Exemption, i: int, ends: Floats) -> Distances:
-    """The distances of all ``ends`` (k, 2, 3) from the area of attachment ``i`` and the closest points of this area, (2 k,)."""
+    """The distances (2 k,) of all ``ends`` (k, 2, 3) from the area of attachment ``i``, and the closest points of this area."""
     part = exempt.part[exempt.by == i]
     return distances(ends.reshape(-1, 3), Surface(part.reshape(-1, 3), np.arange(3 * len(part)).reshape(-1, 3)))

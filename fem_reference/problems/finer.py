@@ -18,7 +18,7 @@ _SHARES = 64
 
 @dataclass(frozen=True, eq=False)
 class OfParts:
-    """The fibre directions in the parts of cells, taken from the cells. Each cell has eight successive parts."""
+    """The fibre directions in the parts of cells, taken from the cells. The eight parts of a cell have successive numbers."""
 
     fibre: Directions
 

@@ -48,7 +48,7 @@ def returned(slip: Floats, limit: Floats, stiffness: float) -> Returned:
 
 
 def since_entry(gap: Floats, before: Floats, felt: float) -> tuple[Floats, Floats]:
-    """The fraction (n,) of each of n straight paths that lies within contact, and its derivative (n,) with respect to ``gap``.
+    """The fraction (n,) of each of n straight paths along which there is contact, and its derivative (n,) with respect to ``gap``.
 
     The gap decreases from ``before`` (n,) [mm], which is at least ``felt`` [mm], to ``gap`` (n,) [mm], which is below ``felt``.
     """

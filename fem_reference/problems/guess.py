@@ -1,4 +1,4 @@
-"""Guesses of the path of a muscle, from the motion of its bones, and of its shape as a beam, before the case is solved."""
+"""Guesses before a case is solved: the path of a muscle, guessed from the motion of its bones, and its shape as a beam."""
 
 from dataclasses import dataclass, replace
 

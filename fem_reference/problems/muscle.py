@@ -59,7 +59,7 @@ RELAXING = 10  # an overlap at rest is removed over this many frame numbers befo
 
 
 def kept_meshes() -> Path | None:
-    """The folder in which tetrahedra are stored, which may be deleted; None if tetrahedra are made anew each time."""
+    """The folder in which tetrahedra are stored; it may be deleted. None if tetrahedra are made anew each time."""
     return platformdirs.user_cache_path("fem_reference") / "meshes"
 
 
@@ -230,9 +230,9 @@ def _body(case: MuscleCase, i: int, muscle: Surface) -> Bone:
 
 
 def closed_form(bone: CaseBone, muscle: Surface, place: str) -> Bone:
-    """The bone that a record ``bone`` describes by a closed form, with its surface near a ``muscle``. Errors name ``place``."""
+    """The bone that a record ``bone`` describes by an analytic shape, with its surface near a ``muscle``. Errors name ``place``."""
     form, motion = solid(bone), bone.motion.poses() if bone.motion else None
-    assert form is not None  # a CaseBone record has a closed form or a surface with its unit
+    assert form is not None  # a CaseBone record has an analytic shape or a surface with its unit
     return Bone(bone.name, tessellated(form, muscle.points, place), motion, solid=form)
 
 
@@ -255,7 +255,7 @@ def _attached(case: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tu
 
 
 def solid(bone: CaseBone) -> Obstacle | None:
-    """The closed form of a ``bone``; None if the bone is a surface in a file."""
+    """The analytic shape of a ``bone``; None if the bone is a surface in a file."""
     given = ((name, getattr(bone, name)) for name in CLOSED_FORMS)
     return next((CLOSED_FORMS[name](**form.model_dump()) for name, form in given if form is not None), None)
 

@@ -246,7 +246,7 @@ def _instants(bone: Bone, frames: Sequence[int]) -> Floats:
 
 
 def explained(case: MusclesCase, rest: MusclesSetup) -> tuple[Decision, ...]:
-    """The decision on each effect. An effect on all muscles is needed if any muscle needs it, and contact if two come near."""
+    """The decision on each effect. An effect on all muscles is needed if any muscle needs it; contact if two come close."""
     found = [decisions(part, one) for part, one in zip(case.parts, rest.muscles.values(), strict=True)]
     every: list[Decision] = []
     for effect in case.effects:
@@ -271,7 +271,7 @@ def _touches(case: MusclesCase, rest: MusclesSetup, effect: MuscleContact) -> De
 
 
 def needed(case: MusclesCase, found: tuple[Decision, ...]) -> MusclesCase:
-    """A copy of the case with only the effects that are needed according to the decisions ``found``, on all or single muscles."""
+    """A copy of the case with only the effects, on all muscles or on one, that are needed according to the decisions ``found``."""
     kept: list[Any] = [one.effect for one in found if one.needed]
     own = tuple(
         one.model_copy(

@@ -122,7 +122,7 @@ def _facts_of_muscle(setup: Setup, case: MuscleCase) -> dict[str, object]:
 
 
 def _shape(bone: Bone) -> str:
-    """The shape of a bone in words: the number of triangles of its surface, or its closed form."""
+    """The shape of a bone in words: the number of triangles of its surface, or its analytic shape."""
     if bone.solid is None:
         return f"{len(bone.surface.triangles)} triangles"
     kind = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(bone.solid).__name__)

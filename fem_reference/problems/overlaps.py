@@ -29,7 +29,7 @@ def overlap_at(mesh: Cells, law: Touching, points: Floats) -> float:
 
     For two parts it is the greater of two depths: the maximum depth of the corners of each part below the skin of the other part's
     piece of the mesh (a lower bound), and the depth of facets that cross (too large where ridges cross). For a part with itself it
-    is the greater of the maximum depth of the centre of a facet within the entire skin, and the depth of facets that cross the
+    is the greater of the maximum depth of the centre of a facet inside the entire skin, and the depth of facets that cross the
     skin. Curved facets are measured at their corners, and their bulge is subtracted.
     """
     one, other = mesh.facets[law.one], mesh.facets[law.other]
@@ -56,7 +56,7 @@ def through_itself(now: Surface, rest: Surface) -> tuple[float, Floats]:
     """A lower bound on the depth [mm] to which a surface ``now`` penetrates itself, and the position (3,) of this penetration.
 
     Vertices at which the surface penetrates itself at ``rest`` do not count. If there are no such vertices, the depth of triangles
-    within the body counts too, because crossing triangles show less depth.
+    within the body counts too, because the depth to which triangles cross each other is smaller.
     """
     known = _crossing(rest) if len(pairs := self_crossings(now)) else ()
     new = pairs[~np.isin(now.triangles[pairs], known).any(axis=(1, 2))]
@@ -81,8 +81,8 @@ def longest_edge(mesh: Cells, law: Touching) -> float:
 
 
 def unseen(mesh: Cells, law: Touching) -> float:
-    """The depth [mm] to which a right-angled edge can penetrate between contact points an eighth of the longest edge apart, as 42
-    points on a facet. Between 16 points on a facet it can penetrate about twice as deep, but no more is allowed.
+    """The depth [mm] to which a right-angled edge can penetrate between contact points that are an eighth of the longest edge
+    apart, as with 42 points on a facet. With 16 points it can penetrate about twice as deep, but checks allow only this depth.
     """
     return BETWEEN * longest_edge(mesh, law) / 4
 

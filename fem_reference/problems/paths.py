@@ -53,7 +53,7 @@ class Affine:
 def radially(
     share: float, along: tuple[float, float, float] = (1.0, 1.0, 1.0), knots: tuple[tuple[float, float], ...] = ONCE
 ) -> Affine:
-    """A displacement away from the origin by ``share`` times the amount times the distance, along axes with an ``along`` of 1."""
+    """A displacement away from the origin by ``share`` times amount times distance, along axes whose entry in ``along`` is 1."""
     x, y, z = along
     return Affine(((share * x, 0.0, 0.0), (0.0, share * y, 0.0), (0.0, 0.0, share * z)), knots=knots)
 

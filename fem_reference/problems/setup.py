@@ -37,8 +37,8 @@ def kept_distances() -> Path:
 @dataclass(frozen=True, eq=False)
 class Bone:
     """A rigid bone. ``surface``: its surface at rest; ``motion``: None if the bone is fixed; ``distance_error`` and
-    ``distance_rounding`` [mm]: as in ``CaseBone``; ``solid``: the closed form on which the vertices of the surface lie, None for a
-    surface from a file.
+    ``distance_rounding`` [mm]: as in ``CaseBone``; ``solid``: the analytic shape on which the vertices of the surface lie, None
+    for a surface from a file.
     """
 
     name: str

@@ -21,7 +21,7 @@ Counts = tuple[int, int, int]
 
 # Nodes closer to each other than this fraction of the body's size are merged.
 _SAME = 1e-9
-# The bulge of the sides of the square in a disc, chosen so that three blocks meet at each of its corners at 120 degrees each.
+# The bulge of the sides of the square in a disc, for which three blocks meet at each of its corners at angles of 120 degrees.
 _BULGE = np.tan(np.pi / 12) / 2
 # Half the side of the square, divided by the radius of its disc.
 _SQUARE_IN_CYLINDER = 0.45
@@ -131,7 +131,7 @@ def warped_box(
 ) -> Cells:
     """A :func:`box` whose inner nodes are moved by up to ``bump`` times its size. Its faces do not move.
 
-    If ``bump`` is 0.15 or more, cells may be inverted; curved tetrahedra are the first if there is only one cell along an axis.
+    If ``bump`` is 0.15 or more, cells may be inverted; if there is only one cell along an axis, curved tetrahedra are the first.
     """
 
     def place(unit: Floats) -> Floats:
@@ -170,9 +170,9 @@ def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, d
 
 
 def _patches(place: Callable[[Floats, Floats, Floats], Floats], counts: Counts, ends: dict[str, str]) -> list[Brick]:
-    """Three blocks of an octant around its corner. ``place``: a function from points (n, 3) on the outer faces of the unit cube,
-    unit vectors (n, 3) at even angles along an edge, and the fraction (n, 1) of the path outward, to points (n, 3) [mm]. ``ends``:
-    the regions on the faces z0 and z1.
+    """Three blocks of an octant around its corner. ``place``: a function that returns points (n, 3) [mm]. Its arguments are points
+    (n, 3) on the outer faces of the unit cube; unit vectors (n, 3) at even angles along an edge; and the fraction (n, 1) of the
+    path outward. ``ends``: the regions on the faces z0 and z1.
     """
 
     def patch(axis: int) -> Brick:
@@ -245,7 +245,7 @@ def cylinder(radius: float, length: float, rings: int, slices: int, kind: Kind, 
 
 
 def _in_ventricle(disc: Floats) -> Floats:
-    """Points (n, 3) [mm] of the ventricle's wall, from x and y in the unit disc, whose rim is the base, and the relative depth."""
+    """Points (n, 3) [mm] of the ventricle's wall. ``disc``: x and y in the unit disc, whose rim is the base, and relative depth."""
     depth = _WALL * disc[:, 2]
     short, long = _SHORT + depth, _LONG + depth
     radius = np.hypot(disc[:, 0], disc[:, 1])

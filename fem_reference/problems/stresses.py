@@ -58,7 +58,7 @@ def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None, shares: Shares = 
 
 @dataclass(frozen=True)
 class StressSizes:
-    """Sizes of stresses [MPa] in a state, root mean square over the volume. ``acts``: the stress of the acting effects without
+    """Sizes of stresses [MPa] in a state, as root mean squares over the volume. ``acts``: the stress of the acting effects without
     pressure; ``added``: the change of stress that each of the other effects would cause. ``stretch``: the smallest and the greatest
     fibre stretch. All values are NaN if no sampled tetrahedron has a det F above 0.05.
     """
@@ -106,7 +106,7 @@ class StressSamples:
 def _added(acting: Acting, one: tuple[Effect, float], now: Floats, stress: Callable[[Acting], Floats]) -> Floats:
     """The change (n, 3, 3) of the stress ``now`` (n, 3, 3) of the effects ``acting`` that the further effect ``one`` would cause.
 
-    For an energy, it is the stress of this energy with the prestrains among ``acting``. ``stress``: the stress of any effects.
+    For an energy, it is the stress of this energy with the prestrains in ``acting``. ``stress``: a function from effects to stress.
     """
     if isinstance(one[0], Energy):
         return stress([*(other for other in acting if isinstance(other[0], Prestrain)), one])
@@ -132,7 +132,7 @@ class Watch:
 
     The stresses of omitted and of acting effects follow from a solved state without another solution. The former are compared with
     the latter: during a run, with the maximum of the ``known`` estimate and the stresses so far; at the end, with the maximum of
-    all stresses. ``frames``: the surface (n, 3) of each frame, and the stresses in its tetrahedra, None without any.
+    all stresses. ``frames``: the surface (n, 3) of each frame, and the stresses in its tetrahedra, None without tetrahedra.
     """
 
     def __init__(self, case: MuscleCase, rest: Setup, known: Estimates, built: Callable[[], Problem]) -> None:

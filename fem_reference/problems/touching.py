@@ -1,4 +1,4 @@
-"""Contact between parts of a body's surface: on separate pieces of its mesh (several bodies in one), or of one part with itself."""
+"""Contact between parts of a body's surface on separate pieces of its mesh (several bodies in one), or of a part with itself."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

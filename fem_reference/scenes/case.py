@@ -219,7 +219,7 @@ class Case(Record):
         return [self.model_dump(include={*self.determined_by, "choice"}), self.effects, solved]
 
     def determining(self) -> dict[str, Any]:
-        """The keys that determine the solution and their values, without the effects."""
+        """The keys that determine the solution, with their values but without the effects."""
         return self.model_dump(mode="json", include=set(self.determined_by))
 
     @property
@@ -238,7 +238,7 @@ class Case(Record):
 
 
 def _exists(path: Path) -> bool:
-    """True if the file or folder exists; False also for text that cannot be a path."""
+    """True if the file or folder exists; False if it does not, or if its name cannot be a path."""
     try:
         return path.exists()
     except (OSError, ValueError):  # a name that is too long or contains a null character

@@ -31,7 +31,7 @@ def read(case: str | Path, *, with_negative_control: bool = False, changes: dict
     """Read a shipped case by name, or the case in a folder or a file. A case with a ``domain`` has a scalar field.
 
     ``changes``: new values by key, such as ``"frames.last"`` or ``"effect[1].bulk"``. ``with_negative_control``: True to apply the
-    negative control of the case. It is checked even if it is not applied, unless ``changes`` has only other keys.
+    negative control of the case. It is checked even if it is not applied, unless there are ``changes`` and they leave it as it is.
     """
     path = _scene_file(case)
     table = texts.toml(path)
@@ -151,7 +151,7 @@ def _check_negative_control(case: Case, changed: Case) -> None:
 
 
 def _wrong(case: Case, part: str, want: str) -> InputError:
-    """The InputError for a ``part``, key or value, of the negative control."""
+    """The InputError for a ``part`` (``key`` or ``value``) of the negative control."""
     value = getattr(case.negative_control, part)
     got = f'"{value}"' if isinstance(value, str) else repr(value)
     return InputError(join(case.place, f"negative_control.{part}"), got, want)
@@ -242,7 +242,7 @@ def _effect(table: Any, place: str, kind: type[Record]) -> Record:
 
 
 def _check_muscles(case: MusclesCase) -> None:
-    """Raise InputError unless the names of muscles differ, contact is stated for all muscles, and each muscle is valid."""
+    """Raise InputError unless the names of muscles differ, no contact is stated for one muscle only, and each muscle is valid."""
     check_acting(case.effect, [bone.name for bone in case.bone], case.frames, case.place)
     others = [bone.name for bone in case.bone]
     others += [one.name for muscle in case.muscle for one in muscle.attachment]

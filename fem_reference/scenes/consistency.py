@@ -1,4 +1,4 @@
-"""Checks across the keys of a muscle case: names are unique, references exist, and the muscle is at rest at the first frame."""
+"""Checks across the keys of a muscle case: names are unique and known, and the muscle is at rest at the first frame."""
 
 import numpy as np
 

@@ -60,8 +60,8 @@ class KohoutKukacka(Record):
 
 
 class Chmd(Record):
-    """Fibres interpolated by the method CHMD of Kohout and Cholt between fibres on the surface of the muscle. ``count``: the number
-    of fibres.
+    """Fibres interpolated between fibres on the surface of the muscle, by the method that Kohout and Cholt call CHMD (report
+    DCSE/TR-2022-03, 6.1.2). ``count``: the number of fibres.
 
     ``heads``: a file for each head of the muscle, with three or more fibres around the head. ``around``: instead of files, fibres
     that are traced along a Laplace field just below the surface.

@@ -111,11 +111,11 @@ class Rod(Record):
 
 
 class CaseBone(Record):
-    """A rigid body: a ``surface`` file with coordinates in ``unit``, or exactly one of the analytic shapes (``half_space``,
-    ``box``, ``sphere``, ``capsule``, ``cylinder``). Without a ``motion`` the bone is fixed.
+    """A rigid body: a ``surface`` file with coordinates in ``unit``, or exactly one analytic shape (``half_space``, ``box``,
+    ``sphere``, ``capsule``, ``cylinder``). Without a ``motion`` the bone is fixed.
 
-    ``distance_error``: the allowed root-mean-square error of the distance near the surface, before it is smoothed.
-    ``distance_rounding``: the standard deviation of the Gaussian filter that smooths it, because sharp edges hinder sliding.
+    ``distance_error``: the allowed root-mean-square error of the distance near the surface, before the distance is smoothed.
+    ``distance_rounding``: the standard deviation of the Gaussian filter that smooths the distance, as sharp edges hinder sliding.
     """
 
     name: Name
@@ -138,7 +138,7 @@ class CaseBone(Record):
             raise ValueError('"unit" if and only if "surface" is given')
         for key, most in (("distance_error", 1.0), ("distance_rounding", 10.0)):
             if self.surface is None and key in self.model_fields_set:
-                raise ValueError(f'"{key}" only with "surface", as a closed form has none')
+                raise ValueError(f'"{key}" only with "surface", as an analytic shape has none')
             if not _FINEST <= getattr(self, key) <= most:
                 raise ValueError(f'"{key}" from {_FINEST:g} to {most:g} mm')
         return self
@@ -167,7 +167,7 @@ class Muscle(Record):
 
 
 class VertexList(Record):
-    """Vertices, numbered from 0, in a CSV ``file`` with lines ``vertex[,value]``; with a ``value``, only lines with this value."""
+    """Vertices, numbered from 0, in a CSV ``file`` with lines ``vertex[,value]``; if ``value`` is given, only those with it."""
 
     file: str
     value: int | None = None

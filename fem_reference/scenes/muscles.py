@@ -1,4 +1,4 @@
-"""Frozen records of the case of several muscles, which share bones, frames and a reference, and its split into single muscles."""
+"""Frozen records of the case of several muscles with common bones, frames and reference, and its split into single muscles."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -78,8 +78,8 @@ class MusclesCase(DrivenCase):
         }
 
     def determining(self) -> dict[str, Any]:
-        """The keys that determine the solution and their values, without expectations. If contact between the muscles was left out,
-        ``apart`` is included, because the second check depends on it.
+        """The keys that determine the solution, with their values but without expectations. If contact between the muscles was left
+        out, ``apart`` is included, because the second check depends on it.
         """
         tables = super().determining()
         checked = {"apart": True} if self.apart and self.touching is None else {}

@@ -8,7 +8,7 @@ from fem_reference.foundations.records import join
 from fem_reference.scenes import numbers
 from fem_reference.scenes.muscle import MuscleCase
 
-# The keys, apart from those of effects, of numbers that may vary, because they do not affect the measured fibres, bones and frames.
+# Keys, apart from those of effects, of numbers that may vary: the fibres, bones and frames used for measuring stay the same.
 _OTHERS = re.compile(r"attachment\[\d+\]\.(stiffness|outline\.shift\.by)|fibres\.turned\.angle")
 _VARIED = (
     "a number of an effect, the stiffness or outline.shift.by of an attachment, or fibres.turned.angle: "

@@ -158,7 +158,7 @@ WRONG_BONES = [
     (
         "bone[0]",
         {"name": "wall", "capsule": ROD, "distance_error": "0.05 mm"},
-        'want "distance_error" only with "surface", as a closed form has none',
+        'want "distance_error" only with "surface", as an analytic shape has none',
     ),
     (
         "bone[0]",
