@@ -13,7 +13,7 @@ from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx.dolfinx_door import PETSc
 
-import basix  # isort: skip - after the door
+import basix  # isort: skip - after dolfinx_door
 import basix.ufl  # isort: skip
 import ufl  # isort: skip
 from dolfinx import fem, mesh  # isort: skip
@@ -21,8 +21,8 @@ from dolfinx.fem.petsc import apply_lifting, assemble_matrix, assemble_vector, s
 from mpi4py import MPI  # isort: skip
 from fem_reference.solvers.fenicsx import compiling, meshes  # isort: skip
 
-QUADRATURE_DEGREE = 8  # as in scikit_fem, whose rule on the boundary has 3 points
-FACET_DEGREE = 5
+QUADRATURE_DEGREE = 8  # as in scikit_fem
+FACET_DEGREE = 5  # as in scikit_fem, whose rule on the boundary has 3 points
 
 
 def equations(problem: FieldProblem) -> tuple[Any, Any, Any, Ints]:

@@ -1,8 +1,8 @@
 """Contact along the normals of the points: each point presses on the other side where the line along the point's normal meets it.
 
 The normal of a point never jumps, and at the common edge of two facets the line meets both facets at the same position, so forces
-are continuous there. A force and its reaction act along one line, so forces and moments balance to rounding, although the forces
-have no energy.
+are continuous there. A force and its reaction act along one line, so forces and moments balance to within rounding, although the
+forces have no energy.
 """
 
 from dataclasses import dataclass
@@ -24,10 +24,10 @@ _SHALLOW, _NEAR = 0.25, 0.4
 _STAYS = 4.0  # beyond edges, a point stays on its last facet unless another has this many times the pressure
 _ON = 1e-7  # a line meets a facet up to this distance beyond the facet's edges, in reference coordinates
 _AT = 0.02  # the same for the point of a facet that is nearest to a point
-_BENT = 3.0  # largest height, in bulges of a facet, of a point inside that it may face; 2.1 for a bend of 45 degrees
+_BENT = 3.0  # largest height, in bulges of a facet, of a point inside the body that faces the facet; 2.1 for a bend of 45 degrees
 _SAME = 1e-6  # two crossings of a line are the same up to this distance [mm]
-# A point is in contact if it has at least this fraction of its pressure, or if its depth beyond the smoothing is at most this many
-# times the depth that belongs to its pressure.
+# A point is in contact if it has at least this fraction of its full pressure, or if its depth beyond the smoothing is at most this
+# many times the depth that belongs to its pressure.
 _HALF, _YIELDS = 0.5, 2.0
 
 
@@ -196,7 +196,7 @@ class RayPass(Pass):
         return met.left * facing(met.here, met.there)[0] * self._ends(met.there.at, met.gap, met.facets)[0]
 
     def depth(self, met: Met) -> float:
-        """The maximum depth [mm] of points on facets, normal to the facets."""
+        """The maximum depth [mm], normal to the facets, of the points whose hits are on facets."""
         cosine, on = -np.vecdot(met.here.normal, met.there.normal), self.other.beyond(met.there.at) <= _ON
         return float((-met.gap * cosine)[on].max(initial=0.0))
 
@@ -240,9 +240,9 @@ class RayPass(Pass):
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
         """The points (k,) that went through the other side, as in ``Pass.through``.
 
-        Points that ``met`` the other side are in contact if they have at least half of their pressure. All other points, and points
-        that ``Pass`` would meet, are in contact only to a depth that fits their pressure. Points that end in front of the nearest
-        facet and face it are not lost: they slid round an edge.
+        Points that ``met`` the other side are in contact if they have at least half of their full pressure. All other points, and
+        points that ``Pass`` would meet, are in contact only to a depth that fits their pressure. Points that end in front of the
+        nearest facet and face it are not lost: they slid round an edge.
         """
         deep = np.full(len(self.areas), self.law.smoothing)
         np.maximum.at(deep, met.points, self.law.smoothing + _YIELDS / self.law.stiffness * self.pressure(met)[0])
