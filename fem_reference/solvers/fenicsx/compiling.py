@@ -32,7 +32,7 @@ OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """Let one process at a time run FFCx's compilation. A lock per form would need its signature, which is slow to compute."""
+    """Let one process at a time run FFCx's compilation. A lock per form would need the form's signature, slow to compute."""
 
     @wraps(compiled)
     def waiting(objects: list[Any], *given: Any, **options: Any) -> R:

@@ -77,7 +77,7 @@ class Supports:
         self.contact.settle()
 
     def springs(self, response: Floats) -> list[Pressed]:
-        """The contact, with no pressure but the tangent of the springs still in contact at a ``response`` (n,) of the unknowns."""
+        """The contact without pressure, with the tangent of the springs still in contact at a ``response`` (n,) of the unknowns."""
         found = []
         for near, gap, normal, depth in zip(self.near, self.gaps, self.normals, self._depths(response), strict=True):
             some = np.flatnonzero(depth >= 0)

@@ -38,7 +38,7 @@ def _step(x: Floats) -> tuple[Floats, Floats]:
 
 
 def facing(here: FacetPlaces, there: FacetPlaces) -> tuple[Floats, Floats]:
-    """The fraction (n,) of the pressure that acts, and its derivative with respect to the cosine between the points' normals."""
+    """The fraction (n,) of the pressure that acts, and its derivative with respect to the cosine (defined as for ``GRAZING``)."""
     share, slope = _step((-np.vecdot(here.normal, there.normal) - GRAZING) / (_FRONTAL - GRAZING))
     return share, slope / (_FRONTAL - GRAZING)
 
@@ -79,8 +79,8 @@ class Changes:
     The quantities are x - y (3), the tangents of the point's facet along the point's normal (2), and the tangents of the other
     facet along the other normal (2) and along the point's normal (2). ``rows`` (n, 9, a): the derivatives of the quantities with
     respect to the unknowns. Derivatives with respect to the quantities: ``turn`` (n, 3, 9) of the point's normal, ``slid``
-    (n, 2, 9) of the hit's reference coordinates, ``opened`` (n, 9) of the gap, and ``cosine`` (n, 9) of the cosine between the
-    normals.
+    (n, 2, 9) of the hit's reference coordinates, ``opened`` (n, 9) of the gap, and ``cosine`` (n, 9) of the cosine (defined as
+    for ``GRAZING``).
     """
 
     rows: Floats
@@ -118,9 +118,9 @@ class RayPass(Pass):
     degree = 14  # 42 points on a facet instead of 16, so that a point leaving a sharp margin takes less force with it
 
     def met(self, unknowns: Floats, most: float, last: Met | None = None, _: Settled | None = None) -> Hits:
-        """The hits of lines along the points' normals, at gaps up to ``most`` [mm] along the lines and to the depth of
-        ``Pass.met``. On either side of a point the first crossing decides: if its facet faces away, the point is not inside (for a
-        crossing behind the point) or not outside (for a crossing in front of it).
+        """The hits of lines along the points' normals, at gaps up to ``most`` [mm] along the lines and down to the depth
+        of ``Pass.met``. On either side of a point the first crossing decides: if its facet faces away, the point is not inside (for
+        a crossing behind the point) or not outside (for a crossing in front of it).
         """
         nodes = self.other.nodes(unknowns)
         some, facets, here = self._lines(unknowns, nodes, most)

@@ -121,7 +121,7 @@ class Pass:
         felt = np.flatnonzero((gap < most) & (gap > -self._reach(nodes)[facets]) & at_edge)
         here = self._here(self.side.nodes(unknowns), some[felt])
         facing = np.einsum("ni,ni->n", here.normal, there.normal[felt])
-        # A point just beyond the edge of a facet that it sees from inside is outside: the facet in front of it is out of reach.
+        # A point just beyond the edge of a facet seen from inside is outside the body: the facet before the point is out of reach.
         edge_on = (gap[felt] < -most) & (beyond[felt] > 0) & (facing > _FACING) & ~held[felt]
         faces = (facing < 0) & ~edge_on
         found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt])
