@@ -30,7 +30,7 @@ def _slides(direction: list[float], distance: str) -> dict[str, object]:
 
 
 def bar(ball: str = "2 mm") -> MuscleProblem:
-    """A bar of 10 x 10 x 40 mm between two bones, one of which moves by 3 mm. A sphere of radius 3 mm moves ``ball`` into it."""
+    """A bar of 10 x 10 x 40 mm between two bones, one of which moves by 3 mm. A sphere of radius 3 mm moves into it by ``ball``."""
     ball_bone = {"sphere": {"centre": "-3.2, 5, 20 mm", "radius": "3 mm"}, "motion": _slides([1, 0, 0], ball)}
     hold = [{"face": "z0"}, {"face": "z1", "motion": _slides([0, 1, 0], "3 mm")}]
     table = {
