@@ -33,7 +33,7 @@ def sliding_by(path: float) -> Callable[[float], Floats]:
 
 
 def plate(lab: Lab, element: str, stiffness: float) -> Finding:
-    """Measure the force [N] on a frictionless rigid plate that is pressed onto a cube.
+    """Compute the force [N] on a frictionless rigid plate that is pressed onto a cube.
 
     The model is one eighth of a cube with sides of 2 mm. ``stiffness``: contact stiffness of the plate [MPa/mm].
     """
@@ -92,7 +92,7 @@ READINGS: dict[str, Callable[[Frame], float]] = {
 
 
 def ball(lab: Lab, reading: str, radius: float) -> Finding:
-    """Measure one quantity of READINGS for a sphere of ``radius`` [mm] pressed into a large body."""
+    """Compute one quantity of READINGS for a sphere of ``radius`` [mm] pressed into a large body."""
     state = pressed(lab, 4, radius)
     depth = 1000 * state.scalars["contact_depth"]
     return Finding(READINGS[reading](state), note=f"the penetration of the sphere is {depth:.1f} micrometres")
@@ -127,8 +127,8 @@ def hertzian(
 ) -> Iterator[Entry]:
     """One entry of the catalogue for each quantity in ``readings``.
 
-    ``name`` and ``title``: texts with a placeholder ``{}``, which is replaced by the words in ``_SAID``. ``measure``: function that
-    measures a quantity. ``known``: function that returns its exact value. ``because``: the reason for the tolerance.
+    ``name`` and ``title``: texts with a placeholder ``{}``, which is replaced with the words in ``_SAID``. ``measure``: function
+    that computes a quantity. ``known``: function that returns its exact value. ``because``: the reason for the tolerance.
     """
     for reading in readings:
         end, words, unit = _SAID[reading]

@@ -19,7 +19,7 @@ from fem_reference.verification.parts import SLOW, clamped, control, find, neare
 
 cook = find("cook")
 THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
-SMALL = 1e-5  # fraction of the load with a linear response; second-order terms are about 1e-5 of the response
+SMALL = 1e-5  # fraction of the load at which the response is linear; second-order terms are about 1e-5 of the response
 RESIDUAL = 1e-5  # at the full load of about 100 N [N, mm3]
 LOCKED = 0.5  # the panel locks if its tip reaches less than this fraction of the true displacement
 

@@ -28,7 +28,7 @@ STEPS = {"first_step": 0.25, "residual": 1e-13}
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """The ``effects`` of a body without its resistance to volume change, and the same material as a ``law`` of ``validation/``."""
+    """The ``effects`` of a body, except its resistance to volume change, and the same material as a ``law`` of ``validation/``."""
 
     effects: tuple[Effect, ...]
     law: object

@@ -26,7 +26,7 @@ QUARTER = Turn((0.0, 1.0, 0.0), np.pi / 2, knots=((1.0, 0.0), (2.0, 1.0)))
 
 
 def weight(density: float, times: float = 1.0) -> Effect:
-    """Gravity along -z on a material of ``density`` [tonne/mm3], with ``times`` the gravity of the earth."""
+    """Gravity along -z on a material of ``density`` [tonne/mm3], ``times`` as strong as on earth."""
     pull = f"0, 0, {-FREE_FALL * times} mm/s^2"
     return make("gravity", density=f"{density} tonne/mm^3", acceleration=pull, ramp=parts.ramp())
 

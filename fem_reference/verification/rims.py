@@ -59,7 +59,7 @@ def body(level: int, grading: float, *, plane: bool) -> Body:
 
 
 def order(lab: Lab, grading: float, *, plane: bool) -> Finding:
-    """Measure the order of convergence of the force on the clamped half.
+    """Compute the order of convergence of the force on the clamped half.
 
     The order follows from the differences between three levels of meshes, so the exact force need not be known.
     """

@@ -55,7 +55,7 @@ def blocks(lab: Lab, stiffness: float, *, itself: bool = False) -> Finding:
 
 
 def _quarter(n: int) -> Cells:
-    """A quarter of a large body, z >= 0, with ``n`` cells in its core and larger cells outside; "near" is the centre of z0."""
+    """A quarter of a large body, z >= 0, with ``n`` cells along each side of its core; "near" is the centre of z0."""
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
     flat = mesh.facets["z0"]
     near = np.linalg.norm(mesh.points[flat][..., :2], axis=2).max(axis=1) < FLAT
@@ -92,7 +92,7 @@ def ball(lab: Lab, reading: str, radius: float) -> Finding:
 
 
 def known_ball(name: str) -> float:
-    """The closed form for an elastic ball on a body of the same material."""
+    """The value of the quantity ``name`` in Hertz's closed form, for an elastic ball on a body of the same material."""
     hertz = find("hertz")
     flat, round_ = (hertz.Side(radius, YOUNG, POISSON) for radius in (math.inf, RADIUS))
     # Two equal compliances in series: half the force of a rigid ball at the same approach.

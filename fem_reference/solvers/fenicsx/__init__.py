@@ -54,8 +54,8 @@ def require(settings: BodySettings | FieldSettings) -> None:
 
 
 def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -> None:
-    """Raise InputError for a key below ``place`` unless the laws resist both shear and a change of volume, the element suits
-    tetrahedra and the effects, and the number of ranks suits the linear solver.
+    """Raise InputError, naming ``place`` or a key inside it, unless the laws resist both shear and a change of volume, the element
+    suits tetrahedra and the effects, and the number of ranks suits the linear solver.
     """
     if any(isinstance(one, MuscleContact) for one in effects):
         _check_touching(settings, place)
@@ -93,7 +93,7 @@ def _solve(problem: AnyMuscle, settings: Settings, sink: Sink, kept: Kept | None
     describe = _describing(problem, settings)
     passed: list[float] = list(kept.frames) if kept else []
 
-    def pass_on(frame: Frame) -> None:  # drops earlier frames, in which overlaps at rest are removed
+    def pass_on(frame: Frame) -> None:  # drops frames before the first requested one: they remove overlaps at rest
         if frame.number in problem.frames:
             described = describe(frame, is_first=not passed)
             sink(described if chosen.store_state else replace(described, state=None))
@@ -266,7 +266,7 @@ def _has_steps(problem: AnyMuscle) -> bool:
 
 
 def _check_touching(settings: Settings, place: str) -> None:
-    """Raise InputError for a key below ``place`` if the settings do not support touching muscles."""
+    """Raise InputError, naming a key inside ``place``, if the settings do not support touching muscles."""
     if (settings.ranks or 1) > 1:
         want = "1, as several muscles and muscles that touch themselves are solved on one rank"
         raise InputError(join(place, "ranks"), settings.ranks, want)

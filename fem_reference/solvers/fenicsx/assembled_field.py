@@ -21,8 +21,8 @@ from dolfinx.fem.petsc import apply_lifting, assemble_matrix, assemble_vector, s
 from mpi4py import MPI  # isort: skip
 from fem_reference.solvers.fenicsx import compiling, meshes  # isort: skip
 
-QUADRATURE_DEGREE = 8  # as in scikit_fem, whose rule on the boundary has 3 points
-FACET_DEGREE = 5
+QUADRATURE_DEGREE = 8  # as in scikit_fem
+FACET_DEGREE = 5  # as in scikit_fem, whose rule on the boundary has 3 points
 
 
 def equations(problem: FieldProblem) -> tuple[Any, Any, Any, Ints]:

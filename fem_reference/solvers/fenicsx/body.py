@@ -133,8 +133,8 @@ class AssembledBody:
         return found
 
     def _settle(self, before: Floats, frame: float) -> None:
-        """Accept the current state as the state of ``frame``. ``before`` (n,): the unknowns at the start of the load step; if work
-        and energy disagree, a state halfway through the step is computed, starting from them.
+        """Accept the current state as the state of ``frame``. ``before`` (n,): the unknowns at the start of the load step, from
+        which a state halfway through the step is computed if work and energy disagree.
         """
         after, contact, middle = np.array(self.unknowns.x.array), self.system.contact, (self.at + frame) / 2
         looked, restoring = list[bool](), [one.restoring() for one in self.contacts]
@@ -173,7 +173,7 @@ class AssembledBody:
         self.go_back(before)
 
     def recall(self, frame: float) -> bool:
-        """Restore an earlier state with the loads and boundary conditions of ``frame`` and return True, if there is one, its
+        """Restore an earlier state with the loads and boundary conditions of ``frame`` and return True, if such a state exists, its
         residual confirms equilibrium, and no jump leads to it (after a full turn the loads are as at rest, but the state is not).
         """
         if self.clock.matters or not self.reuse:
@@ -208,7 +208,7 @@ class AssembledBody:
             self.known.add(KnownState(self._acting(frame), unknowns, modes))
 
     def take_up(self, frame: float, unknowns: Floats, *, recalled: bool) -> None:
-        """Restore the state of ``frame``, with ``unknowns`` (n,), as if it had just been reached. ``recalled``: see ``recall``."""
+        """Restore the state of ``frame``, with ``unknowns`` (n,), as if just reached. ``recalled``: True if ``recall`` found it."""
         self.set_frame(frame)
         self.unknowns.x.array[:] = unknowns
         if self.contact:
@@ -294,7 +294,7 @@ def _linear_solver(system: System, body: Body, settings: BodySettings) -> Linear
     symmetric = body.has_energy and all(one.stored for one in body.effects if isinstance(one, Load))
     kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
     if kind == "multigrid":
-        system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # as its stubs declare it
+        system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # a number in the stubs
         return Multigrid(system)
     precision = settings.precision or ("double" if kind == "direct" else "single")
     return Factorised(system.matrix, symmetric, kind == "lagged", precision, system.spent)

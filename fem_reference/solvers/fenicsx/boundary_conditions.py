@@ -112,8 +112,8 @@ class PointSprings:
 
 
 class Tendons(PointSprings):
-    """Straight lines from ``points`` in this rank's cells to the anchor of a ``Prescribed`` condition, which moves along the path
-    of the condition. A taut line pulls with its stiffness times its extension ``l - l0``; a slack line exerts no force.
+    """Straight lines from ``points`` in this rank's cells to the anchor of a ``Prescribed`` condition; the anchor moves along the
+    path of the condition. A taut line pulls with its stiffness times its extension ``l - l0``; a slack line exerts no force.
     """
 
     def __init__(self, unknowns: fem.Function, entry: Prescribed, points: ContactPoints) -> None:

@@ -55,7 +55,7 @@ class Nearby:
         self.met = np.ones(patches.count, bool)
 
     def find(self, nodes: Floats, local: Callable[[Ints], Floats]) -> tuple[Ints, Sampled]:
-        """The points (n,) that may be within reach, and the bone's distance sampled at these points.
+        """The points (n,) that may be within reach, and the distance from the bone, sampled at these points.
 
         ``nodes`` (m, 3) [mm]: the positions of the nodes in the bone's frame; ``local``: a function that returns the positions of
         given points in that frame.

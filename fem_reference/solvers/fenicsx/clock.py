@@ -52,7 +52,7 @@ class Clock:
         return self.resting and self.at >= self.first
 
     def instant(self, unknowns: Floats) -> None:
-        """Start a load step from rest at ``unknowns`` that is too short for any motion."""
+        """Start a load step, too short for any motion, from rest at ``unknowns``."""
         self._set(unknowns, self._seconds(_INSTANT * self.whole))
 
     def begin(self, unknowns: Floats) -> None:

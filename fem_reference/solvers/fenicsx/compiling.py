@@ -32,7 +32,7 @@ OPTIONS: dict[str, Any] = {"cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """Let one process at a time run FFCx's compilation. A lock per form would need its signature, which is slow to compute."""
+    """Let one process at a time run FFCx's compilation. A lock per form would need the form's signature, slow to compute."""
 
     @wraps(compiled)
     def waiting(objects: list[Any], *given: Any, **options: Any) -> R:
@@ -70,7 +70,7 @@ def _complete[R](search: Callable[..., R]) -> Callable[..., R]:
 generator.compile_forms = _alone(generator.compile_forms)
 generator.compile_expressions = _alone(generator.compile_expressions)
 generator.get_cached_module = _complete(generator.get_cached_module)
-# UFL creates an element's cell, with all cells of its boundary, at each access; this is a fifth of the set-up time of a small body.
+# UFL creates an element's cell, with all cells of its boundary, at each access, which takes a fifth of a small body's set-up time.
 ufl.cell.Cell = cache(ufl.cell.Cell)
 
 

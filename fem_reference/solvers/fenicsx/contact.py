@@ -136,7 +136,7 @@ class ContactForces:
         return bool(self.comm.allreduce(any(len(one.pressed) for one in self.now), MPI.LOR))
 
     def tractions(self) -> Tractions:
-        """The pressed points of all bones, and the tractions on them."""
+        """The points that bones press, and the tractions on them."""
         which = np.concatenate([np.zeros(0, np.int64), *(one.pressed for one in self.now)])
         return which, np.concatenate([np.zeros((0, 3)), *(one.traction for one in self.now)])
 
@@ -241,7 +241,7 @@ class ContactForces:
 
     def trouble(self, _: Floats, /) -> Trouble | None:
         """The trouble *diverged* if a point has gone through a bone since the last settled state, is pressed near the middle of a
-        bone, or has come into contact with friction from too far away.
+        bone, or has come into contact, with friction, from too far away.
         """
         with self.spent.on("contact"):
             through = [one for i in range(len(self.bones)) if (one := self._through(i))]
@@ -249,7 +249,7 @@ class ContactForces:
         return Trouble("diverged", why) if why else None
 
     def _yielded(self) -> list[tuple[float, str]]:
-        """Bones with a pressed point so deep that it could leave on any side: depth divided by half the thickness, a message."""
+        """Bones with a point so deep that it could leave on any side: depth divided by half the thickness, and a message."""
         mine, allowed = list[tuple[float, str]](), self.law.allowance(self.frame)
         for entry, one, before in zip(self.bones, self.now, self.overlaps, strict=True):
             depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""Facets of a deforming surface: polynomials in the positions of their nodes, points on facets, and nearest points on facets."""
+"""Facets of a deforming surface: polynomials through their nodes, points on facets, and nearest points on facets."""
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -19,7 +19,7 @@ _FLAT, _OFF = 0.01, 1e-9
 # The largest offset of a point from the normal at its nearest point, as a fraction of the size of the facet; and reference
 # coordinates far beyond the edges.
 _ASIDE, _NOWHERE = 1e-6, 9.0
-_BALL = 1.25  # the radius of a ball around a facet, as a multiple of the largest distance of a node from their mean
+_BALL = 1.25  # the radius of a ball around a facet, as a multiple of the largest distance of its nodes from their mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ class Facets:
         of the facets.
 
         Facets are continued beyond their edges; nearest points far beyond the edges are only approximate. Where the method does not
-        converge, ``at`` is set far beyond the edges, so that the point does not seem to be near a facet far from it.
+        converge, ``at`` is set far beyond the edges, so that a distant facet does not seem to be near the point.
         """
         at, going = self._middles(which)
         for i in range(_ITERATIONS):

@@ -17,8 +17,8 @@ Before = Callable[[Ints], tuple[Floats, Floats]]
 @dataclass(frozen=True, eq=False)
 class Grip:
     """Friction of n points ``which`` (n,), in the frame of the bone: the ``traction`` (n, 3) [MPa], its derivative ``slope``
-    (n, 3, 3) [MPa/mm] and the anchors ``stuck`` (n, 3) [mm]. ``lost`` (n,) [N/mm]: the work dissipated per
-    rest area since the settled state.
+    (n, 3, 3) [MPa/mm] and the anchors ``stuck`` (n, 3) [mm]. ``lost`` (n,) [N/mm]: the work dissipated per unit rest area since the
+    settled state.
     """
 
     which: Ints
@@ -29,7 +29,7 @@ class Grip:
 
 
 class Friction:
-    """The friction of one bone by a ``law`` that has a coefficient of friction. ``stuck`` (n, 3) [mm]: the anchors of the points in
+    """The friction on one bone, by a ``law`` with a coefficient of friction. ``stuck`` (n, 3) [mm]: the anchors of the points in
     the frame of the bone; NaN for points that are not pressed.
     """
 
@@ -41,8 +41,8 @@ class Friction:
         the gaps there, with derivatives; ``before``: a function, see ``Before``.
 
         The elastic slip e is the vector from the anchor to the point, without its component along the unit normal n. The traction
-        is ``-min(k |e|, friction p) e/|e|``. A point that has come into contact since the settled state slips from the position at
-        which its straight path comes within the smoothing.
+        is ``-min(k |e|, friction p) e/|e|``, with stiffness k and pressure p. A point that has come into contact since the settled
+        state slips from the position at which its straight path comes within the smoothing.
         """
         slip, change = self._slip(which, here, gaps, before)
         length = np.linalg.norm(gaps.gradient, axis=1)

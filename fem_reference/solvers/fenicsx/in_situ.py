@@ -68,7 +68,7 @@ class Supports:
         self.press(np.zeros(len(contact.unknowns.x.array)))
 
     def press(self, response: Floats) -> None:
-        """Give the bones the pressure at rest that their springs have at a ``response`` (n,) of the unknowns."""
+        """Give the bones the pressure at rest that their springs exert at a ``response`` (n,) of the unknowns."""
         for overlap, near, gap, depth in zip(
             self.contact.overlaps, self.near, self.gaps, self._depths(response), strict=True
         ):
@@ -77,7 +77,7 @@ class Supports:
         self.contact.settle()
 
     def springs(self, response: Floats) -> list[Pressed]:
-        """The contact with the tangent of those springs that remain in contact at a ``response`` (n,) of the unknowns."""
+        """The contact without pressure, with the tangent of the springs still in contact at a ``response`` (n,) of the unknowns."""
         found = []
         for near, gap, normal, depth in zip(self.near, self.gaps, self.normals, self._depths(response), strict=True):
             some = np.flatnonzero(depth >= 0)

@@ -31,7 +31,7 @@ class Kept:
 
 def kept(cut_off: CutOff, body: Body) -> Kept:
     """The states from which a run continues; all other files in the folder are removed. There are none if contact depends on
-    earlier states (``Body.remembers``), as these are not stored.
+    its history (``Body.remembers``), which is not stored.
     """
     whole = Kept(cut_off.folder.resolve(), fingerprint(body.mesh.points, body.mesh.cells))
     frames = tuple(number for number in cut_off.numbers if not body.remembers and _is_of(whole, number))

@@ -61,7 +61,7 @@ class Factorised:
 
     def _choose(self, precision: str) -> None:
         self.precision, self.entries = precision, self.matrix.getInfo()["nz_used"]
-        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)  # type: ignore[arg-type]  # as its stubs declare it
+        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)  # type: ignore[arg-type]  # a number in the stubs
         self.krylov = fgmres(self.matrix, _MOST)
         self.krylov.setOptionsPrefix(f"fem_reference_{next(_number)}_")
         self.preconditioner = self.krylov.getPC()

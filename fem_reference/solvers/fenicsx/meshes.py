@@ -19,7 +19,7 @@ from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 DEGREE = {"P1": 2, "P1/P1": 2, "P2": 5, "P2/P0": 5, "P2/P1": 5, "Q1": 3, "Q2": 5, "Q1/P0": 3, "Q2/Q1": 5}
 
 # A rule of degree 5 that includes the vertices: the weight of a vertex, then weights and barycentric coordinates of the other
-# orbits. Weights are fractions of the volume.
+# sets of points. Weights are fractions of the volume.
 _VERTEX_SHARE = 0.002
 _ON_MEDIANS = ((0.11990832171874463, 0.3141518976943535), (0.09393542311163477, 0.10944719170192463))
 _ON_BIMEDIANS = (0.02277083677974708, 0.010913290341505138)
@@ -105,7 +105,7 @@ class Displacement:
 
 
 def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
-    """Distribute the mesh that the first rank holds over all ranks."""
+    """Distribute the first rank's mesh over all ranks."""
     element = basix.ufl.element("Lagrange", cells.kind, cells.degree, shape=(3,))
     ours = reference_nodes(cells.kind, cells.degree)
     nodes = lagrange(cells.kind, cells.degree).points

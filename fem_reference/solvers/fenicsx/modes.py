@@ -83,8 +83,8 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
 
 
 def _lowest(body: AssembledBody, pressures: int) -> Floats:
-    """The displacement (n,) of the unknowns, at most 1 mm, along which the energy decreases most, by inverse iteration. The shift
-    is large enough that the only negative pivots are those of the ``pressures``, which is the number of pressure unknowns.
+    """The displacement (n,) of the unknowns, at most 1 mm, along which the energy decreases most, by inverse iteration. The
+    diagonal is shifted until only ``pressures`` negative pivots remain, one for each pressure unknown.
     """
     system, free, dofs = body.system, _free(body), body.displacement.dofs
     system.linearise()
@@ -106,7 +106,7 @@ def _shifted(body: AssembledBody, shift: Floats) -> Factorised:
     raised, entries = body.system.matrix.duplicate(copy=True), body.system.matrix.getDiagonal()
     entries.array[:] += shift
     raised.setDiagonal(entries)
-    raised.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # type: ignore[arg-type]  # the type that the stubs declare
+    raised.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # type: ignore[arg-type]  # a number in the stubs
     return Factorised(raised, True, False, "double", body.spent)
 
 

@@ -19,8 +19,8 @@ _KEPT, _SHORTEST = 0.1, 1e-2
 _FIRST, _FACTOR, _LOOSEST, _TIGHTEST = 1e-3, 0.5, 1e-3, 1e-9
 # Newton's method gives up if the residual has not fallen to ``_PROGRESS`` times its earlier best within ``_PATIENCE`` iterations.
 _PATIENCE, _PROGRESS = 6, 0.5
-# A tolerance of a linear system that is below the target of Newton's method is lowered to this fraction of the target, as the
-# residual that the last linear system leaves remains at the end of the iteration.
+# If the tolerance of a linear system is below the target of Newton's method, it is lowered to this fraction of the target: the
+# residual of the last linear system is what remains at the end of the iteration.
 _PAST = 1e-2
 
 

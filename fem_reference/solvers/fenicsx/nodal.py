@@ -1,4 +1,4 @@
-"""Positions and unknowns of a body's nodes and cells on every rank, in an order that readers without FEniCSx understand."""
+"""Positions and unknowns of a body's nodes and cells on every rank, in an order that does not depend on FEniCSx."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ class Nodal:
     def __init__(
         self, cells: Cells, own: Ints, element: str, displacement: Displacement, clock: Clock, rest: RestStress | None
     ) -> None:
-        """``own``: the indices in the body of this rank's cells, in the order of the rank."""
+        """``own``: the indices in the body of this rank's cells, in this rank's order."""
         kind, degree, order = ELEMENTS[element]
         self.cells, self.own, self.clock, self.unknowns = cells, own, clock, displacement.unknowns.x
         self.rest = rest

@@ -27,7 +27,7 @@ class OwnPairs:
         return np.asarray(self.next_to[one, other]).ravel() if len(one) else np.zeros(0, bool)
 
     def near(self, balls: tuple[Floats, Floats], reach: Floats, *states: Floats) -> tuple[Ints, Ints]:
-        """Pairs of facets (p,) and (p,) that face each other in one of the ``states`` and share no node.
+        """Pairs of facets, as two arrays (p,), that face each other in one of the ``states`` and share no node.
 
         ``balls``: the centres (m, 3) and radii (m,) [mm] of balls around the facets. The ball of the first facet of a pair comes
         within ``reach`` (m,) [mm] of the centre of the second facet. ``states``: positions (m, k, 3) [mm] of the nodes.

@@ -19,14 +19,14 @@ KEPT = 0.1
 _SHARES = (0.0, 1 / 3, 2 / 3, 1.0)
 _CUBIC = np.linalg.inv(np.vander(_SHARES, 4))  # converts values at these fractions to the coefficients of a cubic
 
-# Loads and boundary conditions are the same up to the rounding of a returning motion (in mm, and in entries of a pose).
+# Loads and boundary conditions count as the same up to this difference, due to rounding (in mm, and in entries of a pose).
 _SAME = 1e-9
 # The latest states are kept, up to this memory [bytes] on each rank.
 _MOST = 512e6
 
 
 class Path:
-    """Watches the successive states of a ``system`` for jumps, without solving for any other state. Its methods are collective."""
+    """Watches the successive states of a ``system`` for jumps. Its methods are collective."""
 
     def __init__(self, system: System, determinants: Determinants) -> None:
         self.system, self.determinants = system, determinants

@@ -30,7 +30,7 @@ _SETTINGS = {
 # The number of ranks that is accepted on any machine; more ranks need a machine with as many cores.
 _MOST_RANKS = 8
 PATIENCE = 5.0  # [s] from the request to end a process to the signal that kills it
-# The allowed clock time divided by the sum of processor time limit and start-up time, and the latter; a longer run is inconclusive.
+# The allowed clock time as a multiple of time limit plus start-up time, and the start-up time; a longer run is inconclusive.
 CLOCK, _START = 20, 3.0  # [s]
 _GLANCE = 0.02  # [s] between checks of the processor time
 MARK = "@fem_reference "  # begins each line of output that names the file of a pickled frame or outcome

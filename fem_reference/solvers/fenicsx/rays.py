@@ -1,8 +1,8 @@
 """Contact along the normals of the points: each point presses on the other side where the line along the point's normal meets it.
 
 The normal of a point never jumps, and at the common edge of two facets the line meets both facets at the same position, so forces
-are continuous there. A force and its reaction act along one line, so forces and moments balance to rounding, although the forces
-have no energy.
+are continuous there. A force and its reaction act along one line, so forces and moments balance to within rounding, although the
+forces have no energy.
 """
 
 from dataclasses import dataclass
@@ -24,10 +24,10 @@ _SHALLOW, _NEAR = 0.25, 0.4
 _STAYS = 4.0  # beyond edges, a point stays on its last facet unless another has this many times the pressure
 _ON = 1e-7  # a line meets a facet up to this distance beyond the facet's edges, in reference coordinates
 _AT = 0.02  # the same for the point of a facet that is nearest to a point
-_BENT = 3.0  # largest height, in bulges of a facet, of a point inside that it may face; 2.1 for a bend of 45 degrees
+_BENT = 3.0  # largest height, in bulges of a facet, of a point inside the body that faces the facet; 2.1 for a bend of 45 degrees
 _SAME = 1e-6  # two crossings of a line are the same up to this distance [mm]
-# A point is in contact if it has at least this fraction of its pressure, or if its depth beyond the smoothing is at most this many
-# times the depth that belongs to its pressure.
+# A point is in contact if it has at least this fraction of its full pressure, or if its depth beyond the smoothing is at most this
+# many times the depth that belongs to its pressure.
 _HALF, _YIELDS = 0.5, 2.0
 
 
@@ -38,7 +38,7 @@ def _step(x: Floats) -> tuple[Floats, Floats]:
 
 
 def facing(here: FacetPlaces, there: FacetPlaces) -> tuple[Floats, Floats]:
-    """The fraction (n,) of the pressure that acts, and its derivative with respect to the cosine between the points' normals."""
+    """The fraction (n,) of the pressure that acts, and its derivative with respect to the cosine (defined as for ``GRAZING``)."""
     share, slope = _step((-np.vecdot(here.normal, there.normal) - GRAZING) / (_FRONTAL - GRAZING))
     return share, slope / (_FRONTAL - GRAZING)
 
@@ -79,8 +79,8 @@ class Changes:
     The quantities are x - y (3), the tangents of the point's facet along the point's normal (2), and the tangents of the other
     facet along the other normal (2) and along the point's normal (2). ``rows`` (n, 9, a): the derivatives of the quantities with
     respect to the unknowns. Derivatives with respect to the quantities: ``turn`` (n, 3, 9) of the point's normal, ``slid``
-    (n, 2, 9) of the hit's reference coordinates, ``opened`` (n, 9) of the gap, and ``cosine`` (n, 9) of the cosine between the
-    normals.
+    (n, 2, 9) of the hit's reference coordinates, ``opened`` (n, 9) of the gap, and ``cosine`` (n, 9) of the cosine (defined as
+    for ``GRAZING``).
     """
 
     rows: Floats
@@ -118,9 +118,9 @@ class RayPass(Pass):
     degree = 14  # 42 points on a facet instead of 16, so that a point leaving a sharp margin takes less force with it
 
     def met(self, unknowns: Floats, most: float, last: Met | None = None, _: Settled | None = None) -> Hits:
-        """The hits of lines along the points' normals, at gaps up to ``most`` [mm] along the lines and to the depth of
-        ``Pass.met``. On either side of a point the first crossing decides: if its facet faces away, the point is not inside (for a
-        crossing behind the point) or not outside (for a crossing in front of it).
+        """The hits of lines along the points' normals, at gaps up to ``most`` [mm] along the lines and down to the depth
+        of ``Pass.met``. On either side of a point the first crossing decides: if its facet faces away, the point is not inside (for
+        a crossing behind the point) or not outside (for a crossing in front of it).
         """
         nodes = self.other.nodes(unknowns)
         some, facets, here = self._lines(unknowns, nodes, most)
@@ -196,7 +196,7 @@ class RayPass(Pass):
         return met.left * facing(met.here, met.there)[0] * self._ends(met.there.at, met.gap, met.facets)[0]
 
     def depth(self, met: Met) -> float:
-        """The maximum depth [mm] of points on facets, normal to the facets."""
+        """The maximum depth [mm], normal to the facets, of the points whose hits are on facets."""
         cosine, on = -np.vecdot(met.here.normal, met.there.normal), self.other.beyond(met.there.at) <= _ON
         return float((-met.gap * cosine)[on].max(initial=0.0))
 
@@ -240,9 +240,9 @@ class RayPass(Pass):
     def through(self, before: Floats, last: Met, now: Floats, met: Met) -> Ints:
         """The points (k,) that went through the other side, as in ``Pass.through``.
 
-        Points that ``met`` the other side are in contact if they have at least half of their pressure. All other points, and points
-        that ``Pass`` would meet, are in contact only to a depth that fits their pressure. Points that end in front of the nearest
-        facet and face it are not lost: they slid round an edge.
+        Points that ``met`` the other side are in contact if they have at least half of their full pressure. All other points, and
+        points that ``Pass`` would meet, are in contact only to a depth that fits their pressure. Points that end in front of the
+        nearest facet and face it are not lost: they slid round an edge.
         """
         deep = np.full(len(self.areas), self.law.smoothing)
         np.maximum.at(deep, met.points, self.law.smoothing + _YIELDS / self.law.stiffness * self.pressure(met)[0])

@@ -25,8 +25,8 @@ class Rubbed:
 
     ``rows`` (n, 12, a): the derivatives of the quantities with respect to the unknowns ``dofs`` (n, a); ``pull`` (n, 12) [N]: the
     forces that belong to the quantities; ``second`` (n, 12, 12): the derivatives of the forces, with the sign of an energy's
-    Hessian. ``held`` (n, 2): the anchors, in coordinates of the points' current facets; ``lost`` (n,) [N mm]: the work;
-    ``far`` (n,): the distance slid beyond a facet.
+    Hessian. ``held`` (n, 2): the anchors, in coordinates of the points' current facets; ``lost`` (n,) [N mm]: the
+    dissipated work; ``far`` (n,): the distance slid beyond a facet.
     """
 
     dofs: Ints
@@ -107,7 +107,7 @@ class Rubbing:
         self.facets[met.points], self.at[met.points], self.settled = met.facets, held, np.array(unknowns)
 
     def rubbed(self, met: Met, unknowns: Floats) -> Rubbed:
-        """Friction of points that ``met`` facets: ``-min(k |e|, friction p) e / |e|``, e the elastic slip in the current metric."""
+        """Friction of points that ``met`` facets: ``-min(k |e|, friction p) e / |e|`` for elastic slip e in the current metric."""
         tables = self.other.element.tabulate(3, met.there.at)[..., 0]
         place, whole, elastic, change = self._slipped(met, unknowns, tables)
         covector = np.einsum("nab,nb->na", place.metric, elastic)

@@ -7,7 +7,7 @@ from fem_reference.solvers.fenicsx.system import System
 
 
 class Stability:
-    """The inertia of the tangent of a ``system``, from an LDL^T factorisation that ``linear`` reuses afterwards.
+    """Counts negative eigenvalues of the tangent of a ``system``, with an LDL^T factorisation that ``linear`` reuses afterwards.
 
     A pressure unknown p has the energy ``p (J - 1) - p^2 / 2K``, which gives one negative pivot, -1/K. All other negative pivots
     are negative modes of the displacement, with the corresponding pressure (Haynsworth 1968, doi 10.1016/0024-3795(68)90050-5).

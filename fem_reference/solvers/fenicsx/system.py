@@ -116,7 +116,7 @@ class System:
             if self.touching:
                 self._add_touching(self.touching)
             self.tangent.entries[self.prescribed_diagonal] = 1.0
-            self.matrix.setValuesCOO(self.tangent.entries[:-1])  # type: ignore[arg-type]  # its stubs know sequences only
+            self.matrix.setValuesCOO(self.tangent.entries[:-1])  # type: ignore[arg-type]  # the stubs declare a sequence
             return self._finish(tractions, moves)
 
     def _finish(self, tractions: Tractions | None, moves: Floats | None) -> float:
@@ -168,7 +168,7 @@ class System:
 
     def reactions(self, *, inside: bool = False) -> Floats:
         """The residual (n,) on the ranks that own the unknowns, including prescribed unknowns, but without springs on facets. With
-        ``inside``, it is the residual of the effects inside the body alone.
+        ``inside``, it is also without loads, other springs and contact.
         """
         self.work.array[:] = 0
         self.cells.add(self.work.array)

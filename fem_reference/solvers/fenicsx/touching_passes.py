@@ -13,14 +13,14 @@ from fem_reference.solvers.fenicsx.facets import FacetPlaces, Facets
 from fem_reference.solvers.fenicsx.own_pairs import OwnPairs, pairs
 
 # A point counts as on a facet up to this distance beyond the edges, in reference coordinates: on a convex surface, points between
-# the normals of two facets at their common edge are nearest to neither facet.
+# the normals of two facets at their common edge project onto neither facet.
 _BEYOND = 0.02
 # A point stays on its facet up to this distance beyond the edges, unless another facet is nearer by more than the smoothing: where
 # two facets meet at an angle, Newton's method would otherwise go back and forth between them.
 _STAYS = 0.05
 # The cosine between normals above which a point that slides off a sharp edge is free, as the part faces another way there.
 _FACING = -0.5
-# In self-contact, a point counts as in front of a facet up to this fraction of the radii and half thicknesses of both facets.
+# In self-contact, a point counts as in front of a facet up to this depth, as a fraction of each facet's radius and half thickness.
 _DEEP = 0.125
 # There is no contact pressure up to this cosine between a point's normal and minus the facet's: the point does not face the facet.
 GRAZING = 0.3
@@ -70,7 +70,7 @@ Settled = tuple[Floats, Met | None]
 class Pass:
     """Points of one ``side`` against facets of the ``other``. ``areas`` (n,) [mm2]: half the rest areas; ``names``: of both."""
 
-    degree = 8  # of the quadrature; with 5, the pressure between blocks of unrelated meshes is off by 5 %, not by 2 %
+    degree = 8  # of the quadrature; with 5, the pressure between blocks with non-matching meshes is off by 5 %, not 2 %
 
     def __init__(self, law: Touching, side: Facets, other: Facets, names: tuple[str, str]) -> None:
         self.law, self.side, self.other, self.names = law, side, other, names
@@ -86,7 +86,7 @@ class Pass:
         self.pieces = np.where(other.outward[:, None, None] > 0, corners, corners[:, ::-1])
         middle = other.places(other.rest, np.arange(len(other.rest)), np.full((len(other.rest), 2), 1 / 3))
         self.own = OwnPairs(side) if side is other else None
-        # Below half the thickness of a part, its far side is nearer. Self-penetration at rest does not count as thinness.
+        # A point below half the thickness of a part is nearer its far side. Self-penetration at rest does not count as thinness.
         inset = law.smoothing if self.own else 0.0
         triangles = other.rest[np.arange(len(other.rest))[:, None, None], self.pieces].reshape(-1, 3, 3)
         starts = middle.point - inset * middle.normal
@@ -121,7 +121,7 @@ class Pass:
         felt = np.flatnonzero((gap < most) & (gap > -self._reach(nodes)[facets]) & at_edge)
         here = self._here(self.side.nodes(unknowns), some[felt])
         facing = np.einsum("ni,ni->n", here.normal, there.normal[felt])
-        # A point just beyond the edge of a facet that it sees from inside is outside: the facet in front of it is out of reach.
+        # A point just beyond the edge of a facet seen from inside is outside the body: the facet before the point is out of reach.
         edge_on = (gap[felt] < -most) & (beyond[felt] > 0) & (facing > _FACING) & ~held[felt]
         faces = (facing < 0) & ~edge_on
         found = Met(some[felt], some[felt] // self.each, here, facets[felt], there[felt], gap[felt])
