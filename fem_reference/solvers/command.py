@@ -207,7 +207,7 @@ class CommandSolver(MuscleSolver[CommandSettings]):
         return create_model(self.settings.__name__, __base__=self.settings, __doc__=self.settings.__doc__, **fields)
 
     def moved(self, settings: CommandSettings) -> Moves:
-        """The carrier of the unknowns, as stated in the settings."""
+        """The mesh whose points the program moves, as stated in the settings."""
         return settings.moves
 
     def fills(self, settings: CommandSettings) -> bool:  # noqa: ARG002

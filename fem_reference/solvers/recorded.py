@@ -28,9 +28,9 @@ log = logging.getLogger(__name__)
 
 # There is a warning if the first frame is farther than this [mm] (rms) from the rest surface; rounding in any format is less.
 AT_REST = 0.1
-# The maximum allowed distance, in diagonals of the bounding box of the rest surface: more than solvers move points in their first
-# frame, and less than the effect of a wrong unit (at a tenth of the size, the rms distance is at least 0.9 times the rms radius:
-# 0.26 diagonals for a sphere).
+# The maximum distance of the first frame from rest, in diagonals of the rest surface's bounding box: more than solvers move points
+# in their first frame, and less than the effect of a wrong unit (at a tenth of the size, the rms distance is at least 0.9 times the
+# rms radius: 0.26 diagonals for a sphere).
 NEAR_REST = 0.05
 # The minimum size of a frame relative to rest. No solver shrinks a body so much, but coordinates in m are 1/1000 of those in mm.
 SMALLEST = 1 / 50

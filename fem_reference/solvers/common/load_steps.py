@@ -30,7 +30,7 @@ class Attempt:
         return self.status == "converged"
 
     def refused(self, why: Trouble) -> "Attempt":
-        """A copy of this converged attempt as a failure, because a check found trouble ``why`` with the state."""
+        """A copy of this converged attempt as a failure, because a check found the trouble ``why`` with the state."""
         return replace(self, status=why.status, detail=f"Newton's method converged, but {why.sentence}")
 
 
