@@ -25,13 +25,10 @@ from fem_reference.problems.setup import AttachedVertices, Bone
 # The pairs of corners between which the mid-side nodes of a tet10 lie; the first three pairs are also those of a tri6.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 FACING = [0, 2, 1, 5, 4, 3]  # the order of the nodes of a tri6 that reverses its normal
-# Springs at points are small rigid triangles. SHRUNK: triangle area / tributary area of the point; the penalty is divided by it
-# too.
+# Springs at points are small rigid triangles. SHRUNK: their area / the point's tributary area; the penalty is divided by it too.
 SHRUNK = 0.01
 _LEAST_AREA = 1e-6  # a point has no spring if its tributary area is less than this fraction of the largest
-_CLEAR = (
-    0.005  # the barycentric distance of the small triangles from the edges of a facet, so that no ray misses the facet
-)
+_CLEAR = 0.005  # barycentric distance of the triangles at points from edges of a facet, so that no ray misses the facet
 
 
 def leaf(parent: Element, tag: str, text: object, **attributes: str) -> None:

@@ -25,9 +25,7 @@ from fem_reference.foundations.units import Angle, Force, PositiveLength
 _WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN, _LENGTHENING = 0.45, 5.0, 0.6, 0.04, 1.4
 # The toe of the tendon's curve ends at the fraction _TOE of F0 and has the shape _TOE_SHAPE; beyond the toe the curve is a tangent.
 _TOE, _TOE_SHAPE = 0.33, 3.0
-_TOE_SLOPE = (
-    _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)
-)  # slope at the end of the toe times the strain there
+_TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # slope at its end times strain there
 _TOE_STRAIN = _TENDON_STRAIN * _TOE_SLOPE / (_TOE_SLOPE + 1 - _TOE)
 # Fibre lengths [l0] in equilibrium are sought between _SHORTEST and _LONGEST in steps of about _STEP.
 _SHORTEST, _LONGEST, _STEP = 0.1, 3.0, 0.0075
