@@ -122,7 +122,7 @@ class SpringPoints(NamedTuple):
 
 
 def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringPoints:
-    """The points of the tetrahedra at which the springs of an attachment act, for springs at points of the surface.
+    """The points of the tetrahedra at which springs act, for an attachment with springs at points of the surface.
 
     FEBio's ``tied-elastic`` subtracts the gap at rest. Therefore a triangle in the plane of a facet acts as a spring at a point, if
     its area is the fraction ``SHRUNK`` of the tributary area of the point.

@@ -1,4 +1,4 @@
-"""Adaptive load steps from frame to frame: a step is halved if it fails and grows if it was easy, and no frame is skipped."""
+"""Adaptive load steps from frame to frame: a failed step is halved, steps grow after an easy step, and no frame is skipped."""
 
 import math
 from collections.abc import Callable, Iterator
