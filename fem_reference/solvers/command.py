@@ -69,7 +69,7 @@ class CommandSettings(Record):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def program(self) -> str:
-        """A hash over the files in :func:`sources`, which is a part of the key of a run."""
+        """A hash over the files in :func:`sources`. It is a part of the key of a run."""
         digest = hashlib.sha256()
         for path in sources(self):
             name = path.relative_to(self.place) if path.is_relative_to(self.place) else path.name

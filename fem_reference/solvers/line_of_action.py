@@ -1,4 +1,4 @@
-"""Lines of action: each fibre of the scene is a line between bones that is straight, passes via-points or wraps around obstacles.
+"""Lines of action: each fibre is a line between bones that is straight, passes through via-points or wraps around obstacles.
 
 Report sections 5.1 to 5.3. The ends of a line are those of the fibre, each fixed to the bone whose attachment is nearest at rest.
 Between fixed points the line is as short as possible. It has a length and, with ``hill``, a force, but no surface, so only length

@@ -245,7 +245,7 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
 
 
 def _strangers(triangles: Ints, rest: Ints) -> NDArray[np.bool_]:
-    """A mask (m,) of the ``triangles`` (m, 3) that occur more often than in ``rest`` (m, 3); their first corner does not matter."""
+    """A mask (m,) of the ``triangles`` (m, 3) that occur more often than in ``rest`` (m, 3), whichever corner comes first."""
     both = np.concatenate([_turned(triangles), _turned(rest)])
     which = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     here, there = which[: len(triangles)], which[len(triangles) :]
@@ -262,7 +262,7 @@ def _turned(triangles: Ints) -> Ints:
 def _welded(soup: Surface, rest: Surface) -> Floats:
     """The positions (n, 3) [mm] of the vertices of ``rest``, from a ``soup`` of the same triangles in the same order.
 
-    Triangles of a soup share no vertices, as in an STL file. Raises InputError if corners of the same vertex are apart.
+    Triangles of a soup share no vertices, as in an STL file. Raises InputError if the corners at a vertex do not coincide.
     """
     points, found = np.full(rest.points.shape, np.nan), []
     for vertices in (rest.triangles.ravel(), rest.triangles[:, ::-1].ravel()):

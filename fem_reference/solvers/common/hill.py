@@ -176,7 +176,7 @@ def inverse_hyperbola(force: float, curvature: float) -> float:
     """The velocity of shortening divided by its maximum, at a ``force`` divided by the isometric force: eq. 5.1 solved for v.
 
     In lengthening the force rises to 1.4 times the isometric force along a hyperbola that is twice as steep at velocity 0 (Thelen
-    2003). Beyond their ends both curves continue as tangents.
+    2003). Beyond their ends, the curves of shortening and lengthening continue as tangents.
     """
     slope, rise = 2 * (1 + 1 / curvature), _LENGTHENING - 1
     if force < 0:  # shortening faster than without load
