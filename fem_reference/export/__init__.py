@@ -35,8 +35,8 @@ def export(case: Case, build: Callable[[], CaseProblem], folder: Path, form: For
     """Write the problem that ``build`` creates from a ``case`` into ``folder``, and return the names of the files.
 
     The form ``"febio"`` adds FEBio's input file to the open formats and logs the differences from the reference as warnings. If
-    there are several muscles, each has a folder with its name, and there is one input file for all of them. Raises InputError
-    unless the folder is missing or empty, or if FEBio lacks an effect of the case. After a failure no folder is left behind.
+    there are several muscles, each has a folder with its name, and there is one input file for all of them. Raises InputError if
+    ``folder`` is a file or is not empty, or if FEBio lacks an effect of the case. After a failure no folder is left behind.
     """
     if not isinstance(form, str) or form not in FORMATS:
         raise InputError("form", repr(form), f"one of {', '.join(FORMATS)}")

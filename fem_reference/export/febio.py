@@ -105,7 +105,7 @@ def model(problem: MuscleProblem) -> Element:
 
 
 def _control(root: Element, problem: MuscleProblem) -> None:
-    """Add the section ``Control``: steps of at most ``LONGEST_STEP``, shorter if necessary, with a step that ends at each frame."""
+    """Add the section ``Control``: steps of at most ``LONGEST_STEP``, shorter if necessary so that a step ends at each frame."""
     control, step = SubElement(root, "Control"), _step(problem)
     steps = round((problem.frames[-1] - problem.frames[0]) / step)
     settings = {"analysis": "STATIC", "time_steps": steps, "step_size": step}
@@ -166,13 +166,13 @@ def _motions(root: Element, problem: MuscleProblem) -> None:
 
 
 def _curve_numbers(problem: MuscleProblem) -> dict[str, int]:
-    """The number of the load curve of each bone that moves, by name: 2, 3, ..., as FEBio uses it as an index into a list."""
+    """The number of the load curve of each bone that moves, by name: 2, 3, ..., because FEBio uses it as an index into a list."""
     moving = [bone.name for bone in problem.bones if bone.motion is not None]
     return {name: number for number, name in enumerate(moving, start=2)}
 
 
 def _curves(root: Element, problem: MuscleProblem) -> None:
-    """Add the load curves: curve 1 has the times at which FEBio must stop, each further curve the motion [rad, mm] of a bone."""
+    """Add the load curves: curve 1 has the times at which FEBio must stop, each further curve the motion [rad or mm] of a bone."""
     data, (first, *_, last) = SubElement(root, "LoadData"), problem.frames
     _curve(data, 1, "STEP", [(frame - first, _step(problem)) for frame in problem.frames])
     numbers = _curve_numbers(problem)

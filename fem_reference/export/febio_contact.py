@@ -1,7 +1,7 @@
 """Contact with bones and the springs of attachments in FEBio's input file, and differences between FEBio's model and the reference.
 
-FEBio's ``tied-elastic`` contact applies a traction: the penalty times the change, since rest, of the vector from a point on the
-primary surface to the point on the secondary surface that was nearest at rest. FEBio integrates it over the current primary
+FEBio's ``tied-elastic`` contact applies a traction: the penalty times the change, relative to rest, of the vector from a point on
+the primary surface to the point on the secondary surface that was nearest at rest. FEBio integrates it over the current primary
 surface, which here is a rigid copy of the attached area and keeps its size. Therefore the contact acts like the springs of an
 attachment, with a stiffness per unit rest area that is the same in all directions. Springs at points of the surface are represented
 by small rigid triangles at the nearest points of the tetrahedra.
@@ -97,7 +97,7 @@ def search_radius(problem: MuscleProblem, deep: float) -> float:
 
 
 def notes(problem: MuscleProblem) -> list[str]:
-    """Sentences, with values, about differences from FEBio's model: regions, springs at points, bones that overlap at rest."""
+    """Sentences, with values, about FEBio's differences from the reference: regions, springs at points, overlap at rest."""
     # Springs that act over facets in the reference act in the same way in FEBio.
     on_skins = [one for one in febio_mesh.by_springs(problem) if one.attachment in problem.attached_skins]
     springs = [*(_springs(problem, one) for one in on_skins), *([MEASURED] if on_skins else [])]
@@ -105,7 +105,7 @@ def notes(problem: MuscleProblem) -> list[str]:
 
 
 def _springs(problem: MuscleProblem, attached: AttachedVertices) -> str:
-    """A sentence about springs in FEBio and in the reference: their distance, and their stiffness in total and against rotation."""
+    """A sentence about springs in FEBio and in the reference: the distance between them, and the stiffness of each."""
     skin, found = problem.attached_skins[attached.attachment], febio_mesh.spring_points(problem, attached)
     points, areas = found.points, corner_areas(found.corners) / febio_mesh.SHRUNK
     assert attached.stiffness is not None  # the attachment is by springs

@@ -25,10 +25,10 @@ from fem_reference.problems.setup import AttachedVertices, Bone
 # The pairs of corners between which the mid-side nodes of a tet10 lie; the first three pairs are also those of a tri6.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 FACING = [0, 2, 1, 5, 4, 3]  # the order of the nodes of a tri6 that reverses its normal
-# Springs at points are small rigid triangles. SHRUNK: their area divided by the point's tributary area; it divides the penalty too.
+# Springs at points are small rigid triangles. SHRUNK: their area / the point's tributary area; the penalty is divided by it too.
 SHRUNK = 0.01
 _LEAST_AREA = 1e-6  # a point has no spring if its tributary area is less than this fraction of the largest
-_CLEAR = 0.005  # the barycentric distance of these triangles from the edges of a facet, so that no ray misses the facet
+_CLEAR = 0.005  # barycentric distance of the triangles at points from edges of a facet, so that no ray misses the facet
 
 
 def leaf(parent: Element, tag: str, text: object, **attributes: str) -> None:
@@ -59,7 +59,7 @@ def bone_id(bone: Bone) -> str:
 
 
 def springs_id(attached: AttachedVertices) -> str:
-    """The name of the springs of an attachment in the file, with which the names of their shells and surfaces begin."""
+    """The name, in the file, of the springs of an attachment. The names of their shells and surfaces begin with it."""
     return f"springs_{attached.attachment}"
 
 
@@ -122,7 +122,7 @@ class SpringPoints(NamedTuple):
 
 
 def spring_points(problem: MuscleProblem, attached: AttachedVertices) -> SpringPoints:
-    """The points of the tetrahedra at which the springs of an attachment act, for springs at points of the surface.
+    """The points of the tetrahedra at which springs act, for an attachment with springs at points of the surface.
 
     FEBio's ``tied-elastic`` subtracts the gap at rest. Therefore a triangle in the plane of a facet acts as a spring at a point, if
     its area is the fraction ``SHRUNK`` of the tributary area of the point.
@@ -179,7 +179,7 @@ class Mesh:
         return np.hstack([facets, np.reshape(np.array(middles, np.int64), (-1, 3))])
 
     def _area(self, attached: AttachedVertices) -> Ints:
-        """The triangles (m, 6) of an attachment, with outward normals; for springs at points, the triangles that contain points."""
+        """The triangles (m, 6) of an attachment, with outward normals; for springs at points, those that contain these points."""
         if attached.attachment in self.problem.attached_skins:
             return self.curved(np.unique(spring_points(self.problem, attached).facets, axis=0))
         return self.curved(self.outer[found_in(self.outer, self.problem.mesh.facets[attached.attachment])])

@@ -82,7 +82,7 @@ def parts(problem: MuscleProblem) -> tuple[Piece, ...]:
 
 
 def _parameters(problem: MuscleProblem, known: dict[str, Floats]) -> list[tuple[str, Floats]]:
-    """The parameters of effects, times shares: pairs of a key and the values (m,) in all tetrahedra.
+    """The parameters of effects, multiplied by shares: pairs of a key and the values (m,) in all tetrahedra.
 
     A parameter is the sum over all effects of the same kind, except that each ``fibre_passive`` is separate.
     """

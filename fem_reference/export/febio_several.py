@@ -82,7 +82,7 @@ def _renamed(root: Element, name: str, before: dict[str, int]) -> None:
 
 
 def _touch(sections: dict[str, Element], problem: MusclesProblem) -> None:
-    """Add contact between each pair of muscles that may touch, in two passes with half of the stiffness, as in the reference."""
+    """Add contact between each pair of muscles that may touch, in two passes, each with half the stiffness, as in the reference."""
     if not problem.pairs:
         return
     assert problem.law is not None  # there are pairs only with a law of contact

@@ -43,7 +43,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, case: Case, file: str | None = None, **values: str) -> None:
-    """Write the template ``file``, by default that with the name of ``path``, with ``values`` and facts about the ``case``."""
+    """Write the template ``file``, by default the one with the name of ``path``, filled with ``values`` and facts of ``case``."""
     template = Template((Path(__file__).parent / (file or path.name)).read_text(encoding="utf-8"))
     known = {
         "title": case.title,

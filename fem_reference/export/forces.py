@@ -66,7 +66,7 @@ def applied(run: Run, bone: Bone, setup: Setup) -> Floats:
     """The points of application (f, 3) [mm] of the force on a ``bone``, NaN if the force is 0.
 
     The central axis consists of the points about which the moment is parallel to the force. The point of application is the point
-    of this line that is nearest to the mean of the attached vertices, or to the origin for a bone without an attachment.
+    on this axis that is nearest to the mean of the attached vertices, or to the origin for a bone without an attachment.
     """
     attached = [one.vertices for one in setup.attached if one.bone.name == bone.name]
     vertices = np.concatenate(attached) if attached else np.zeros(0, np.int64)

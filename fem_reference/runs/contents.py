@@ -89,7 +89,7 @@ def amend(folder: Path, **changes: Any) -> None:
 
 
 def vector_scalars(name: str, vector: Floats) -> dict[str, float]:
-    """The components of a ``vector`` (3,) as scalars of a frame, whose names consist of ``name`` and the axis."""
+    """The components of a ``vector`` (3,) as scalars of a frame, each with a name that consists of ``name`` and its axis."""
     return {f"{name}_{axis}": float(value) for axis, value in zip("xyz", vector, strict=True)}
 
 

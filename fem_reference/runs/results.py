@@ -190,7 +190,7 @@ class _Places:
         return inside[:, 0] if inside.shape[1] == 1 else np.asarray((inside * self.corners).sum(axis=1))
 
     def values(self, names: Sequence[str], acting: Sequence[tuple[Effect, float]]) -> dict[str, Floats]:
-        """The results with these ``names``, as described at ``Results.evaluate``. ``acting``: the effects and their amounts."""
+        """The results with these ``names``, as described in ``Results.evaluate``. ``acting``: the effects and their amounts."""
         values: dict[str, Any] = {
             "displacement": self.displacement,
             "deformation_gradient": self.F,

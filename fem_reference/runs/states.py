@@ -137,9 +137,9 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
 
 
 def read_arrays(path: Path, names: tuple[str, ...] = (), also: tuple[str, ...] = ()) -> Arrays:
-    """The arrays in an .npz file that ``names`` lists (by default all), and the arrays in ``also`` that exist.
+    """The arrays with the given ``names`` (by default all) in an .npz file, and those with names in ``also`` that exist.
 
-    Raises InputError if the file is damaged, too large or without one of ``names``.
+    Raises InputError if the file is damaged or too large, or if it lacks one of the ``names``.
     """
     try:
         with path.open("rb") as file:

@@ -47,9 +47,9 @@ class Frame:
     ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, energy (stored) [N mm], newton_iterations,
     cut_backs. The reference adds the extremes of means over cells, min_cell_volume_ratio and max_cell_volume_ratio and, if a law
     limits the fibre stretch, min_cell_fibre_stretch and max_cell_fibre_stretch; outside_law, the number of cells outside the range
-    of a law; if all energy is stored, energy_gap, the growth not due to work (``solvers/fenicsx/path``; for muscles by Simpson's
-    rule if the trapezoidal rule is poor); if the tangent is symmetric, the number of negative_modes and of material_modes among
-    them (``solvers/fenicsx/stability``); with contact, the maximum contact_depth [mm] and contact_pressure [MPa], and the
+    of a law; if all energy is stored, energy_gap, the increase of energy not due to work (``solvers/fenicsx/path``; for muscles by
+    Simpson's rule if the trapezoidal rule is poor); if the tangent is symmetric, the number of negative_modes and of material_modes
+    among them (``solvers/fenicsx/stability``); with contact, the maximum contact_depth [mm] and contact_pressure [MPa], and the
     contact_area at rest [mm2]; for a muscle, the stresses of ``stress_statistics``, such as stress_von_mises_p95 [MPa].
     """
 
@@ -242,7 +242,7 @@ def _check_same(folder: Path, names: list[str], frames: list[Floats], rest: Floa
 
 
 def status(folder: Path) -> str:
-    """The status in the ``run.json`` of a run in ``folder``: ``"running"`` for a run that was cut off, or ``"damaged"``."""
+    """The status in the ``run.json`` of a run in ``folder``: ``"running"`` if it was cut off, ``"damaged"`` if unreadable."""
     try:
         return str(texts.read_json(folder / "run.json", "a run")["status"])
     except (InputError, KeyError, TypeError):

@@ -79,7 +79,7 @@ def places(folder: Path, number: float) -> tuple[Floats, Floats | None]:
 def pass_on(folder: Path, to: Path) -> None:
     """Copy the run in ``folder``, if it has restart files, to the folder ``to``, where another run can continue it.
 
-    Nothing is copied if ``to`` exists. In both cases the restart files in ``folder`` are removed.
+    Nothing is copied if ``to`` exists. In any case the restart files in ``folder`` are removed.
     """
     if (folder / RESTART).is_dir() and not to.exists():
         with tempfile.TemporaryDirectory(dir=to.parent) as new:

@@ -67,7 +67,7 @@ def in_table(kind: str | None = None) -> tuple[Candidate, ...]:
 def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
     """The name of the run, and the solver with its settings, for ``name``, which is the name of a candidate or of a solver.
 
-    The settings are those of a candidate of the case; without one, for a muscle, those in table-5-1; otherwise the defaults.
+    The settings are those of such a candidate in the case; without one, those on the page table-5-1 (for a muscle) or the defaults.
     """
     own = [one for one in case.candidate if one.solver == name] + [one for one in case.candidate if one.name == name]
     table = [one for one in in_table() if one.solver == name and case.task == "solve"]

@@ -3,9 +3,9 @@
 The edges around each vertex form a cell, which is rotated with as little distortion as possible. Frame number n is the state in
 which the bones have their pose of frame n; attached vertices move exactly with their bone. Starting from the previous state, the
 method alternates between the rotations of all cells (local step) and the positions of the free vertices (global step). If the rows
-of attached vertices are removed and each edge has the same weight at both ends, each step minimises eq. 5.10 over its unknowns, so
-the energy never rises. This also holds with negative weights, because the matrix is still the positive definite stiffness matrix of
-linear elements. Attachments by springs are treated as exact, and there is no contact.
+of attached vertices are removed from the equations and each edge has the same weight at both ends, each step minimises eq. 5.10
+over its unknowns, so the energy never rises. This also holds with negative weights, because the matrix is still the positive
+definite stiffness matrix of linear elements. Attachments by springs are treated as exact, and there is no contact.
 """
 
 from collections.abc import Callable
@@ -47,7 +47,7 @@ class ArapSettings(Record):
     states as kirchhoff weights. ``rotations``: fitted before "each" global step, or once per frame ("first only"), in which case
     later iterations change nothing. ``volume_step``: after each global step, the free vertices are scaled by eq. 5.9 about the mean
     of all vertices. ``iterations``: the number per frame, or the maximum if there is a ``tolerance``. ``tolerance`` [mm]:
-    iterations end when no vertex moves farther than this in one of them; if some frame needs more than ``iterations``, the run ends
+    iterations end after one in which no vertex moves farther than this; if some frame needs more than ``iterations``, the run ends
     ``out of steps``.
     """
 
@@ -74,7 +74,7 @@ def laplacian(cells: VertexCells) -> Any:
 
 
 def least_energy(points: Floats, cells: VertexCells) -> float:
-    """The least energy [mm2] of eq. 5.10, with squared norms, over all rotations of cells, at ``points`` (n, 3)."""
+    """The minimum energy [mm2] of eq. 5.10, with squared norms, over all rotations of cells, at ``points`` (n, 3)."""
     return energy(points, fit_rotations(points, cells), cells)
 
 

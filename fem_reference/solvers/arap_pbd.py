@@ -108,8 +108,8 @@ def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest
 def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdConstraints) -> Floats:
     """The positions ``p + lambda L^-1 grad V`` (n, 3) [mm], with the lambda nearest to 0 that gives the volume of ``rest``.
 
-    p is the ``minimum`` (n, 3) of the global step, and the gradient is evaluated at the positions ``before`` (n, 3) that step. The
-    volume is a cubic polynomial in lambda; Newton's method refines the root nearest to 0. Without a root, p is returned.
+    p is the ``minimum`` (n, 3) of the global step, and the gradient is evaluated at ``before`` (n, 3), the positions before that
+    step. The volume is a cubic polynomial in lambda; Newton's method refines the root nearest to 0. Without a root, p is returned.
     """
     direction = np.zeros_like(minimum)
     if system.factor is None:

@@ -3,8 +3,8 @@
 The distance to a bone is computed only for vertices that may be near the bone: a vertex that has moved relative to the bone by less
 than its distance at the last check is still outside. Only vertices are checked, and only at their new positions. Therefore a sharp
 edge of a bone may pass between vertices, and a vertex that crosses a thin bone in one step ends on the other side. The distance to
-a bone made of triangles is stored on a grid aligned with the axes at rest, so results depend on the axes: if the entire scene of
-hip_flexion is rotated, positions of vertices with ``pbd`` differ by up to 1.2 mm (mean 0.1 mm).
+a bone made of triangles is stored on a grid that at rest is aligned with the coordinate axes, so results depend on these axes: if
+the entire scene of hip_flexion is rotated, positions of vertices with ``pbd`` differ by up to 1.2 mm (mean 0.1 mm).
 """
 
 import math

@@ -69,7 +69,7 @@ class CommandSettings(Record):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def program(self) -> str:
-        """A hash over the files in :func:`sources`, which is a part of the key of a run."""
+        """A hash over the files in :func:`sources`. It is a part of the key of a run."""
         digest = hashlib.sha256()
         for path in sources(self):
             name = path.relative_to(self.place) if path.is_relative_to(self.place) else path.name
@@ -207,7 +207,7 @@ class CommandSolver(MuscleSolver[CommandSettings]):
         return create_model(self.settings.__name__, __base__=self.settings, __doc__=self.settings.__doc__, **fields)
 
     def moved(self, settings: CommandSettings) -> Moves:
-        """The carrier of the unknowns, as stated in the settings."""
+        """The mesh whose points the program moves, as stated in the settings."""
         return settings.moves
 
     def fills(self, settings: CommandSettings) -> bool:  # noqa: ARG002

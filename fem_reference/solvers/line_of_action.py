@@ -1,8 +1,8 @@
-"""Lines of action: each fibre of the scene is a line between bones, straight, through via-points or around obstacles.
+"""Lines of action: each fibre is a line between bones that is straight, passes through via-points or wraps around obstacles.
 
 Report sections 5.1 to 5.3. The ends of a line are those of the fibre, each fixed to the bone whose attachment is nearest at rest.
 Between fixed points the line is as short as possible. It has a length and, with ``hill``, a force, but no surface, so only length
-and force are judged. At an obstacle the line takes the shorter side, so it switches sides when both sides are equally long.
+and force are judged. A line passes an obstacle on the shorter side, and switches sides when both are equally long.
 """
 
 from itertools import pairwise
@@ -29,7 +29,7 @@ from fem_reference.solvers.common.wraps import ObstacleOn, Wraps, wraps_of
 
 
 class LineSettings(Record):
-    """Points through which lines pass, obstacles around which they wrap, and their forces. By default lines are straight.
+    """Points through which lines pass, obstacles around which they wrap, and the forces of lines. By default lines are straight.
 
     ``via``: the via-points, in order along the fibre. ``via_count``: instead of ``via``, the number of via-points that are spread
     evenly over each fibre, each on the bone of the nearer end. ``obstacle``: surfaces around which a line wraps if the straight
@@ -135,7 +135,7 @@ def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[L
 
 
 def _lengths(passed: Passed, paths: Paths | Winding) -> Floats:
-    """The lengths (k,) [mm] of lines: sums over the lengths of their parts."""
+    """The lengths (k,) [mm] of lines: sums of the lengths of their parts."""
     return np.asarray(paths.lengths.reshape(len(passed.points), -1).sum(axis=1))
 
 

@@ -61,7 +61,7 @@ def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outco
 def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
     """Raise InputError, with a key inside ``place``, if the listing does not have the boundary conditions or settings requested.
 
-    Listing 4.1 has value 0 at the first node and slope -1 at the last. Listing 4.5 has fixed values, no slope, no Peclet number.
+    Listing 4.1 has value 0 at the first node and slope -1 at the last. Listing 4.5 has fixed values, but no slope or Peclet number.
     """
     points, fixed = problem.mesh.points, problem.fixed[: len(problem.mesh.points)]
     if problem.mesh.cells.shape[1] == 2:

@@ -54,7 +54,7 @@ class MassSpringSettings(Record):
     ``frame_time``: the time between two frame numbers in this solver, which replaces the interval of the scene; the longer it is,
     the closer the muscle comes to equilibrium. ``damping``: the damping coefficient, or ``"eq. 5.5"`` for its value by eq. 5.5 of
     the report; by default there is no damping. ``gravity``: an acceleration, by default none. ``collision``: contact with bones
-    after every time step, by default none. ``time_step``: the maximum time step, by default 0.9 of the stable time step.
+    after every time step, by default none. ``time_step``: the maximum time step, by default 0.9 times the stable one.
     """
 
     stiffness: Stiffness
@@ -95,9 +95,9 @@ def report_damping(mass: float, stiffness: float) -> float:
 
 
 def stable_time_step(network: Network, fixed: Ints) -> float:
-    """The time step [s] below which eqs 5.6 and 5.7 are stable, however the network is deformed. ``fixed``: the prescribed masses.
+    """The time step [s] below which eqs 5.6 and 5.7 are stable, however the network is deformed. ``fixed``: the attached masses.
 
-    A mode of the free masses with stiffness k is stable if ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions). At a mass with
+    A mode with stiffness k of the free masses is stable if ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions). At a mass with
     n_i springs, stretched or not, k is at most ``2 n_i`` times the stiffness of a spring. The result is the smallest limit over all
     free masses. Each limit is the positive root ``4 m / (c + sqrt(c^2 + 4 k m))``, written in a form without cancellation. For
     c = 0 the root is 2 / omega with omega^2 = k / m, which is the exact limit for two masses on one spring.
@@ -156,7 +156,7 @@ class MassSpringModel:
         self.cost["time_steps"] += self.steps
 
     def carried(self, number: int) -> Floats:
-        """Positions (n, 3) [mm]: attached masses have moved with their bones to frame ``number``, and free masses are at rest."""
+        """Positions (n, 3) [mm]: those at rest, except that attached masses have moved with their bones to frame ``number``."""
         points = np.array(self.problem.mesh.points)
         for entry, masses in zip(self.problem.attached, self.attached, strict=True):
             points[masses] = apply(entry.bone.pose(number), points[masses])

@@ -81,8 +81,8 @@ def distance(p1: Vector, p2: Vector) -> tuple[float, Vector]:
 def volume(points: Floats, triangles: Ints) -> tuple[float, Floats]:
     """Six times the volume [mm3] inside closed ``triangles`` (m, 3), and its gradient (n, 3) [mm2]. Eq. 5.19-5.21.
 
-    Eq. 5.18 omits its factor 1/6 in part; here neither the value nor the gradient contains it. The mean of the points is the
-    origin, which reduces rounding errors and does not change the volume of a closed surface.
+    Eq. 5.18 omits its factor 1/6 in part; here neither the value nor the gradient contains it. The mean of the points is
+    used as the origin, which reduces rounding errors and does not change the volume of a closed surface.
     """
     centre = (points[:, 0].mean(), points[:, 1].mean(), points[:, 2].mean())
     gradient = np.zeros_like(points)

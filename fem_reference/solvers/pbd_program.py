@@ -106,7 +106,7 @@ class Voxels:
 
 
 class VoxelBone:
-    """A bone of voxels that moves.
+    """A moving bone that consists of voxels.
 
     ``voxels``: the voxels of the bone at rest. ``pose`` (4, 4): the present pose, which is the product of all motions, as in the
     program, and differs from the ``given`` pose by rounding. ``last`` (4, 4): the last motion between two different poses.

@@ -181,9 +181,9 @@ def _is_inside(inside: Bools, place: Vector) -> bool:
 def _marks(a: Vector, b: Vector, c: Vector, normal: Vector, corner: Vector) -> bool:
     """True if the triangle with vertices a, b, c [voxels] marks the voxel whose lower corner is ``corner``.
 
-    The triangle marks the voxel if its plane is at most half a diagonal from the corner, and the corner is beyond no edge of the
-    triangle by more than a diagonal. The planes through the edges contain ``normal``, which is computed in mm although voxels are
-    not cubes.
+    The triangle marks the voxel if its plane is at most half a diagonal from the corner, and the corner is not more than a
+    diagonal beyond any edge of the triangle. The planes through the edges contain ``normal``, which is computed in mm although
+    voxels are not cubes.
     """
     away = _unit_normal(minus(b, a), minus(c, a))
     if abs(dot(away, minus(corner, a))) > DIAGONAL / 2:
@@ -248,11 +248,11 @@ def are_inside(inside: Bools, places: Floats) -> Bools:
 
 @compiled
 def march_out(inside: Bools, goals: Floats, displacements: Floats) -> tuple[Floats, Bools]:
-    """Move points that are inside a bone back along their path. Returns their final positions (n, 3) and a mask (n,), in voxels.
+    """Move points that are inside a bone back along their path. Returns their final positions (n, 3) [voxels] and a mask (n,).
 
-    ``goals`` (n, 3): positions inside the bone. ``displacements`` (n, 3): vectors from there back to the start of the step. Points
-    move along them in steps of 1 until they are outside the bone. The mask is True for points that travel farther than the length
-    of their displacement plus 1.
+    ``goals`` (n, 3) [voxels]: positions inside the bone. ``displacements`` (n, 3) [voxels]: vectors from there back to the start of
+    the time step. Points move along them in steps of 1 voxel until they are outside the bone. The mask is True for points that
+    travel farther than the length of their displacement plus 1.
     """
     reached, too_far = goals.copy(), np.empty(len(goals), np.bool_)
     for i in range(len(goals)):

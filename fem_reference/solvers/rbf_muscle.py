@@ -2,8 +2,8 @@
 
 The surface at rest is approximated by Gaussians with four parameters each (``geometry.gaussian_surface``). At each frame number
 
-- a few points of each attachment move with its bone, and the centres of the Gaussians are positioned so that each node of this
-  graph moves as rigidly as possible with its neighbours (eq. 5.10 on a graph of tens of nodes);
+- a few points of each attachment move with its bone, and the centres of the Gaussians are positioned so that, in a graph of these
+  points and centres, each node moves as rigidly as possible with its neighbours (eq. 5.10 with tens of nodes);
 - centres are pushed away from bones that the surface has entered, and vertices that are still inside a bone are moved out;
 - each radius is divided by the square root of the stretch along the muscle near its centre, as stretched fibres become thinner;
   then a common factor on all radii restores the volume at rest.

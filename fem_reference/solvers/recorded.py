@@ -28,9 +28,9 @@ log = logging.getLogger(__name__)
 
 # There is a warning if the first frame is farther than this [mm] (rms) from the rest surface; rounding in any format is less.
 AT_REST = 0.1
-# The maximum allowed distance, in diagonals of the bounding box of the rest surface: more than solvers move points in their first
-# frame, and less than the effect of a wrong unit (at a tenth of the size, the rms distance is at least 0.9 times the rms radius:
-# 0.26 diagonals for a sphere).
+# The maximum distance of the first frame from rest, in diagonals of the rest surface's bounding box: more than solvers move points
+# in their first frame, and less than the effect of a wrong unit (at a tenth of the size, the rms distance is at least 0.9 times the
+# rms radius: 0.26 diagonals for a sphere).
 NEAR_REST = 0.05
 # The minimum size of a frame relative to rest. No solver shrinks a body so much, but coordinates in m are 1/1000 of those in mm.
 SMALLEST = 1 / 50
@@ -245,7 +245,7 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
 
 
 def _strangers(triangles: Ints, rest: Ints) -> NDArray[np.bool_]:
-    """A mask (m,) of the ``triangles`` (m, 3) that occur more often than in ``rest`` (m, 3); their first corner does not matter."""
+    """A mask (m,) of the ``triangles`` (m, 3) that occur more often than in ``rest`` (m, 3), whichever corner comes first."""
     both = np.concatenate([_turned(triangles), _turned(rest)])
     which = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     here, there = which[: len(triangles)], which[len(triangles) :]
@@ -262,7 +262,7 @@ def _turned(triangles: Ints) -> Ints:
 def _welded(soup: Surface, rest: Surface) -> Floats:
     """The positions (n, 3) [mm] of the vertices of ``rest``, from a ``soup`` of the same triangles in the same order.
 
-    Triangles of a soup share no vertices, as in an STL file. Raises InputError if corners of the same vertex are apart.
+    Triangles of a soup share no vertices, as in an STL file. Raises InputError if the corners at a vertex do not coincide.
     """
     points, found = np.full(rest.points.shape, np.nan), []
     for vertices in (rest.triangles.ravel(), rest.triangles[:, ::-1].ravel()):

@@ -33,8 +33,8 @@ from fem_reference.solvers.common.lines import along, nearest_bones
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import Stiffness
 
-# The number of points in a group for shape matching, which are a point of a cross-section and those nearest to it, and the number
-# of rod points that determine the motion of a vertex of the surface.
+# The number of points in a group for shape matching (a point of a cross-section and those nearest to it), and the number of rod
+# points that determine the motion of a vertex of the surface.
 _AROUND, _CARRIERS = 6, 12
 
 

@@ -53,8 +53,8 @@ def project_stretch(points: Floats, turns: Floats, rest: Floats, stiffness: floa
     ``rest`` (k, p - 1, 3) [mm]: the vectors ``l t`` of the segments at rest, with the length l and the unit vector t; u is the
     quaternion of the segment. If C is 0 there is neither stretch nor shear (Kugelstadt and Schoemer 2016): the segment has its rest
     length and the direction of its frame. The inverse mass of a frame is 1 / l^2, so that the result does not depend on the unit of
-    length: the sum of inverse masses times squared gradients is (1 + 1 + 4) / l^2. The step is made smaller as if the sum were
-    2 / l^2 larger, which bounds the effect of neighbouring segments.
+    length: the sum of inverse masses times squared gradients is (1 + 1 + 4) / l^2. The step is reduced as if the sum were larger
+    by 2 / l^2, which bounds the effect of neighbouring segments.
     """
     lengths = np.linalg.norm(rest, axis=2, keepdims=True)
     tangents, u = rest / lengths, turns[:, 1:-1]

@@ -3,10 +3,10 @@
 Macklin, Mueller and Chentanez 2016, "XPBD: position-based simulation of compliant constrained dynamics", DOI
 10.1145/2994258.2994272; the method is mentioned in report section 5.5.3. The surface is a membrane with mass, and its interior
 resists changes of volume. In position based dynamics, which has the same constraints, each additional sweep or step increases the
-stiffness. In XPBD, too few sweeps make the muscle too soft, and enough sweeps give an implicit Euler step. The equilibrium depends
-on the time step only if directions change within a step. This holds if the sweeps converge in each step, which needs more sweeps or
-``sqrt(k / m) dt`` below about 1 for the stiffest edges. With the one sweep of Table 5.1 it is up to 3, and above 1.1 for half of
-the edges: doubling the sub-steps changes positions in hip_flexion by up to 1.6 mm (mean 0.7 mm; displacement 53 mm).
+stiffness. In XPBD, too few sweeps make the muscle too soft, and enough sweeps give an implicit Euler step. If the sweeps converge
+in each step, the equilibrium depends on the time step only if constraint gradients change direction within it. Convergence needs
+many sweeps, or ``sqrt(k / m) dt`` below about 1 for the stiffest edges. With the one sweep of Table 5.1, this is up to 3, and above
+1.1 for half the edges: doubling the sub-steps changes positions in hip_flexion by up to 1.6 mm (mean 0.7 mm; displacement 53 mm).
 
 Frame number n is the state after iteration n, ``frame_time`` after the previous frame. Bones move at constant velocity in between.
 """

@@ -49,7 +49,7 @@ def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> O
     """Advance a ``model`` from rest at the first frame of ``setup`` through every frame number; requested frames go to ``sink``.
 
     ``per_frame``: the number of parts into which the motion to the next frame number is divided; bones move to their pose at the
-    end of each. The status is *out of steps* if a bone moves too far in a part. Raises InputError for too many frame numbers.
+    end of each part. The status is *out of steps* if a bone moves too far in a part. Raises InputError for too many frame numbers.
     """
     frames = setup.frames
     if frames[-1] - frames[0] > MOST_FRAMES:

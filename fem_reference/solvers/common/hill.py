@@ -25,9 +25,9 @@ from fem_reference.foundations.units import Angle, Force, PositiveLength
 _WIDTH, _PASSIVE, _PASSIVE_STRAIN, _TENDON_STRAIN, _LENGTHENING = 0.45, 5.0, 0.6, 0.04, 1.4
 # The toe of the tendon's curve ends at the fraction _TOE of F0 and has the shape _TOE_SHAPE; beyond the toe the curve is a tangent.
 _TOE, _TOE_SHAPE = 0.33, 3.0
-_TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # at its end, times the strain there
+_TOE_SLOPE = _TOE * _TOE_SHAPE * math.exp(_TOE_SHAPE) / math.expm1(_TOE_SHAPE)  # slope at its end times strain there
 _TOE_STRAIN = _TENDON_STRAIN * _TOE_SLOPE / (_TOE_SLOPE + 1 - _TOE)
-# Fibre lengths [l0] in equilibrium are searched between _SHORTEST and _LONGEST in steps of about _STEP.
+# Fibre lengths [l0] in equilibrium are sought between _SHORTEST and _LONGEST in steps of about _STEP.
 _SHORTEST, _LONGEST, _STEP = 0.1, 3.0, 0.0075
 _SLACK = 1e-9  # a tendon whose strain is below this, which may be rounding, is slack
 _LEAST = 1e-3  # the lower bound of the activation when a velocity is computed from a force
@@ -176,7 +176,7 @@ def inverse_hyperbola(force: float, curvature: float) -> float:
     """The velocity of shortening divided by its maximum, at a ``force`` divided by the isometric force: eq. 5.1 solved for v.
 
     In lengthening the force rises to 1.4 times the isometric force along a hyperbola that is twice as steep at velocity 0 (Thelen
-    2003). Beyond their ends both curves continue as tangents.
+    2003). Beyond their ends, the curves of shortening and lengthening continue as tangents.
     """
     slope, rise = 2 * (1 + 1 / curvature), _LENGTHENING - 1
     if force < 0:  # shortening faster than without load

@@ -29,7 +29,7 @@ class CurvePoint(Record):
 
 
 class Via(Record):
-    """A point of each fibre that moves with a ``bone``.
+    """A via-point of each fibre. It moves with a ``bone``.
 
     ``at``: the position of the point at rest, as a fraction of the fibre's length. ``joint``: a joint whose angle affects the
     point. ``within``: the minimum and maximum angle at which lines pass through the point; at other angles they skip it. ``curve``:

@@ -1,4 +1,4 @@
-"""Adaptive load steps from frame to frame: a step is halved if it fails and grows if it was easy, and no frame is skipped."""
+"""Adaptive load steps from frame to frame: a failed step is halved, steps grow after an easy step, and no frame is skipped."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -30,7 +30,7 @@ class Attempt:
         return self.status == "converged"
 
     def refused(self, why: Trouble) -> "Attempt":
-        """A copy of this converged attempt as a failure, because a check found trouble ``why`` with the state."""
+        """A copy of this converged attempt as a failure, because a check found the trouble ``why`` with the state."""
         return replace(self, status=why.status, detail=f"Newton's method converged, but {why.sentence}")
 
 

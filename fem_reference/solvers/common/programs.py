@@ -28,7 +28,7 @@ class Ended:
     """The end of a program.
 
     ``code``: the exit status; if negative, the signal. ``seconds``: the clock time. ``processor``: the processor time [s],
-    including that of processes for which the program waited. ``memory`` [MB]: the maximum peak memory of one of its processes.
+    including that of processes for which the program waited. ``memory`` [MB]: the highest peak memory of any of its processes.
     ``said``: the last line that was printed. ``limit``: the status and the reason if a limit ended the program, otherwise None.
     """
 
@@ -105,7 +105,7 @@ def _kill(process: int) -> None:
 class _Watch:
     """A thread that kills a ``process`` after ``limit`` [s] of processor time, or after ``CLOCK`` times as much clock time.
 
-    ``overran``: the status and the reason if it was killed, otherwise None. ``memory`` [MB]: the maximum peak memory of one of its
+    ``overran``: the status and the reason if it was killed, otherwise None. ``memory`` [MB]: the highest peak memory of any of its
     processes. (The peak from ``os.wait4`` is not used, as it includes the memory of the process that starts the program.)
     """
 

@@ -77,10 +77,10 @@ class Solver[P, S: Record]:
 class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
     """A solver of muscles.
 
-    ``moves``: the carrier of the unknowns, whose resolution determines accuracy and cost. ``depends_on``: "order" or "size" if the
-    result depends on the order of the vertices or on the size of the muscle. ``check_effects``: the check of the effects of a
-    scene; None if the solver does not model them. ``fibres``: True if a surface solver with these settings needs fibres; otherwise
-    the solver receives a ``Setup``, in which the muscle has no tetrahedra.
+    ``moves``: the surface, tetrahedra or lines that have the unknowns; their resolution determines accuracy and cost.
+    ``depends_on``: "order" or "size" if the result depends on the order of the vertices or on the size of the muscle.
+    ``check_effects``: the check of the effects of a scene; None if the solver does not model them. ``fibres``: True if a surface
+    solver with these settings needs fibres; otherwise the solver receives a ``Setup``, in which the muscle has no tetrahedra.
     """
 
     task = "solve"
@@ -92,7 +92,7 @@ class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
     fibres: Callable[[S], bool] = lambda _: False
 
     def moved(self, settings: S) -> Moves:  # noqa: ARG002
-        """The carrier of the unknowns for these settings."""
+        """The value of ``moves`` for these settings."""
         return self.moves
 
     def fills(self, settings: S) -> bool:
@@ -123,7 +123,7 @@ AnySolver = Solver[Any, Any]
 class Trade:
     """A mark on a key of the settings that trades time for accuracy.
 
-    ``ladder``: useful values, as in scene files, from the fastest to the most accurate. A scene may not allow all of them, such as
+    ``ladder``: useful values, as in scene files, from the fastest to the most accurate. Some may be impossible in a scene, such as
     an element for another kind of cell.
     """
 

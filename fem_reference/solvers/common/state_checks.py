@@ -12,7 +12,7 @@ from fem_reference.runs.contents import Status
 # A body has diverged if its size is more than this multiple of its size at rest and of the present size of its attached part.
 _WIDE = 10.0
 # A body has also diverged if it encloses more than this multiple of its volume at rest. The volume of flesh changes by a few
-# percent, and a surface that preserves only its dihedral angles reached twice its volume; a wrong root or scaling gives an
+# percent, and a surface that preserves only its dihedral angles reached twice its rest volume; a wrong root or scaling gives an
 # arbitrary volume. If bones stretch a body to n times its size, the limit is n times as large.
 _LARGE = 5.0
 

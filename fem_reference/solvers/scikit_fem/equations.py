@@ -14,7 +14,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body, Prescribed, is_stabilised
 from fem_reference.solvers.scikit_fem.spaces import DISPLACEMENT, PRESSURE, VARIABLES, Points, Space
 
-# The quadrature degree for each displacement element. On a straight cell it is exact for an energy that is quadratic in the strain.
+# The quadrature degree for each displacement element: exact on a straight cell for an energy that is quadratic in the strain.
 QUADRATURE_DEGREE = {"P1": 2, "P2": 4, "Q1": 3, "Q2": 5}
 _AT_ONCE = 1024  # the number of points that are evaluated together, so that their jets fit into a cache
 
