@@ -48,7 +48,7 @@ VERSION = "1.0.0"
 SHIPPED = ("hip_flexion",)  # cases with the project's own geometry, without anatomy under another licence
 INDEX = "dataset.json"
 _TEST = 0.25  # the fraction of poses, and of shapes, in the test part
-_SAME = 0.01  # the relative difference of volume and principal moments below which shapes are the same
+_SAME = 0.01  # shapes are the same if lengths from volume and principal moments differ by less than this fraction of the size
 
 
 @dataclass(frozen=True)

@@ -128,7 +128,7 @@ def _flat(points: Floats) -> Floats:
 
 
 def _centres(points: Floats, heights: Floats, count: int) -> Iterator[tuple[str, Floats]]:
-    """The name and the centres (count, 2) of each choice of the report's section 3.5.1."""
+    """The name and the centres (count, 2) of each choice in the report's section 3.5.1."""
     yield "grid", radial_basis.grid_centres(points, count)
     yield "Halton", radial_basis.halton_centres(points, count)
     yield "greedy", radial_basis.greedy_centres(points, heights, count, 1.0, terms=_POLYNOMIAL)

@@ -222,7 +222,7 @@ class Bench[C: Case]:
         return ("converged", "denied", *(("stopped",) if self._watched(solver) else ()))
 
     def _checked(self, run: Run) -> Run:
-        """The ``run``, with a second check (stored with the run) if the case is of muscles and the solver models effects."""
+        """The ``run``; with a second check, stored with the run, if the case has muscles and the solver models effects."""
         asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
         if not asked or run.outcome.status not in ("converged", "denied"):
             return run

@@ -16,7 +16,7 @@ _WANT = "an undamaged folder or archive (zip, tar) with published data"
 
 
 class Listed(Record):
-    """Size [bytes] and SHA-256 of files by path below the data folder: ``published`` files, and files ``made`` from these."""
+    """Size [bytes] and SHA-256 of files by path in the data folder: ``published`` files, and files ``made`` from these."""
 
     licence: str
     published: dict[str, tuple[int, str]]
@@ -29,7 +29,7 @@ def known() -> Listed:
 
 
 def fetch(sources: Sequence[Path], folder: Path, wanted: Listed) -> list[str]:
-    """Write each file of ``wanted`` that the ``sources`` contain into a new ``folder``; return the paths of these files below it.
+    """Write each file of ``wanted`` that the ``sources`` contain into a new ``folder``; return the paths of these files in it.
 
     A source is a folder or an archive; names of files in it are ignored. If no file is found, a source is damaged or ``folder`` is
     in use, InputError is raised and no folder is made.

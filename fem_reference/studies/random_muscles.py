@@ -11,8 +11,9 @@ from fem_reference.io import files
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 
-EVERY = 10  # the difference of the frame numbers of successive poses
-_AROUND, _ALONG = 20, 21  # the number of vertices around and along each surface; vertices with equal index correspond
+EVERY = 10  # the difference between the frame numbers of successive poses
+# The number of vertices around and along each surface. Vertices with the same index correspond in all muscles.
+_AROUND, _ALONG = 20, 21
 _TETS = 150  # the approximate number of tetrahedra, each of which is then cut into eight
 _MOTION = "motion = {{ {kind}, keyframes = [{keys}] }}\n"
 _OBSTACLE = """
