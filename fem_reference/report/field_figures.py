@@ -220,7 +220,7 @@ def _windows(points: Floats, anchors: Floats) -> list[_Window]:
 
 
 def _body(figure: Figure, example: Comparison, values: Floats, scale_of: Floats, colours: str) -> None:
-    """Draw a surface in space with y up, as seen along z from the side of its anchors. Each window has its own colour scale."""
+    """Draw a surface in space with y up, seen along z from the side of its fixed vertices. Each window has a colour scale."""
     mesh = example.setup.mesh
     anchors = mesh.points[~np.isnan(example.setup.fixed[: len(mesh.points)])]
     behind = len(anchors) > 0 and anchors[:, 2].mean() < mesh.points[:, 2].mean()

@@ -36,7 +36,7 @@ def is_of_body(reference: object, of: object) -> bool:
 
 
 def check_muscle(name: object, case: object, place: str = "muscle") -> None:
-    """Raise InputError at ``place`` unless ``name`` is one of the muscles of the ``case``, or empty if it has only one."""
+    """Raise InputError at ``place`` unless ``name`` is one of the muscles of the ``case``, or empty if it does not have several."""
     names = [one.name for one in case.muscle] if isinstance(case, MusclesCase) else []
     if name not in (names or [""]):
         got = f'"{name}"' if isinstance(name, str) else said(name)

@@ -84,7 +84,7 @@ def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iter
     """The band of each quantity that the case has, from those ``runs`` of the ``design`` that reached all frames."""
     whole = [complete(run, comparison.reference.numbers) for run in runs]
     context = comparison.context
-    assert isinstance(context, MeasurementContext)  # the case is of a muscle
+    assert isinstance(context, MeasurementContext)  # the case is that of a muscle
     yield _surface(comparison, context, design, whole)
     measured = [change(run, context, {name.split(".")[0] for name in QUANTITIES}) for run in whole]
     for name in QUANTITIES:
@@ -105,7 +105,7 @@ def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iter
 
 
 def _rows(found: Sequence[Floats], like: Floats) -> Floats:
-    """The values ``found`` of n runs as an array (n, f), also for n = 0; ``like`` (f,) has a value for each frame."""
+    """The values ``found`` of n runs as an array (n, f), even for n = 0; ``like`` (f,) has a value for each frame."""
     return np.array(found).reshape(len(found), len(like))
 
 

@@ -1,4 +1,4 @@
-"""Records of hard cases, read from files below ``cases/hard``, with their variants."""
+"""Records of hard cases, read from files inside ``cases/hard``, with their variants."""
 
 import math
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ from fem_reference.scenes.muscle import CaseBone, Frames, Motion
 FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
 FACES: tuple[Face, ...] = get_args(Face)
-_MOST_CELLS = 50_000  # the maximum number of cells of a block; no solver solves as many within its time limit
+_MOST_CELLS = 50_000  # the maximum number of cells of a block; no solver solves so many within its time limit
 FIRST = "block"  # the name of the first of several bodies
 REFERENCE, SECOND = "fenicsx", "scikit_fem"
 LIMIT = 120.0  # the limit of processor time of a run [s]
