@@ -1,4 +1,4 @@
-"""A recommended setting in words: as text and as JSON."""
+"""A recommended setting, as text and as JSON."""
 
 import math
 from collections.abc import Iterable

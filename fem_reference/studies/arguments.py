@@ -36,7 +36,7 @@ def is_of_body(reference: object, of: object) -> bool:
 
 
 def check_muscle(name: object, case: object, place: str = "muscle") -> None:
-    """Raise InputError at ``place`` unless ``name`` is one of the muscles of the ``case``, or empty if it does not have several."""
+    """Raise InputError at ``place`` unless ``name`` is a muscle of the ``case``, or empty if the case does not have several."""
     names = [one.name for one in case.muscle] if isinstance(case, MusclesCase) else []
     if name not in (names or [""]):
         got = f'"{name}"' if isinstance(name, str) else said(name)
@@ -94,7 +94,7 @@ def check_error_bars(bars: object, case: Case) -> None:
 
 def check_run(given: object, case: Case, place: str) -> None:
     """Raise InputError unless ``given`` is a run of the same kind as the ``case`` (muscle or field). If the run names the case that
-    it solved, this must be the ``case``.
+    it solved, it must name this ``case``.
     """
     run = check(given, Run, place, "a Run, such as solve and read_run return")
     scene, effects, place = run.origin.get("scene"), run.origin.get("effects"), f'{place} "{run.name}"'

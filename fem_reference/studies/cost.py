@@ -140,7 +140,7 @@ def settings_of(trial: Trial) -> dict[str, object]:
 
 def greatest(run: Run, truth: Run, context: MeasurementContext, names: Collection[str]) -> dict[str, float]:
     """The maximum magnitude over frames of each deviation of a ``run`` from the ``truth``, by ``metric.statistic``, for the metrics
-    ``names``; NaN if a value is NaN.
+    in ``names``; NaN if a value is NaN.
     """
     found = measure(complete(run, truth.numbers), truth, context, names)
     return {f"{one.metric}.{one.statistic}": float(np.abs(one.values).max()) for one in found}

@@ -213,8 +213,8 @@ def _inside(run: Run, case: MuscleCase) -> Arrays:
 def splits(found: dict[str, Arrays], seed: int) -> dict[str, dict[str, dict[str, list[int]]]]:
     """Indices of frames by scene, for the parts ``train`` and ``test`` of two splits.
 
-    ``pose``: frames of a scene with equal poses are in the same part, and rest is in ``train``. ``shape``: all scenes with the same
-    shape of muscle are in the same part.
+    ``pose``: frames of a scene with equal poses and activation are in the same part, and rest is in ``train``. ``shape``: all
+    scenes with the same shape of muscle are in the same part.
     """
     rng, names = np.random.default_rng(seed), list(found)
     parts: dict[str, dict[str, dict[str, list[int]]]] = {key: {"train": {}, "test": {}} for key in ("pose", "shape")}

@@ -119,7 +119,7 @@ def _flat(points: Floats) -> Floats:
     """Points (n, 3) of an area relative to their mean, in the principal axes of the area (the last is normal to it), and sorted
     along the first axis.
 
-    The result does not depend on the axes of the scene or the order of the points, as third moments along the axes are positive.
+    The result does not depend on the axes of the scene or the order of the points: third moments along the axes are made positive.
     """
     away = points - points.mean(axis=0)
     flat = away @ np.linalg.svd(away, full_matrices=False)[2].T

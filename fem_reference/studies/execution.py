@@ -175,7 +175,7 @@ class Bench[C: Case]:
         return other._run(name, choice, place, lambda _: None)
 
     def _run(self, name: str, choice: SolverChoice, place: str, make: Callable[[Wanted], Run | None]) -> Run | None:
-        """The stored run or, without one, the run from ``make``; repeated with all effects that turn out to matter."""
+        """The stored run or, without one, the run from ``make``. It is repeated with all effects that turn out to matter."""
         if choice.solver == "recorded":  # read each time, as files may change under the same name
             return self.read(name, choice, place)
         offer = solvers.find(choice.solver, place, self.scene.task)

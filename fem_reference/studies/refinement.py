@@ -145,7 +145,7 @@ def needed[C: DrivenCase](bench: Bench[C], reference: Run) -> dict[str, Vary[C]]
 
 
 def finer[C: DrivenCase](bench: Bench[C], reference: Run, ratio: float) -> C:
-    """The scene of a bench on tetrahedra of ``ratio`` times the size, with every other source of error in its bars halved."""
+    """The scene of a bench on tetrahedra of ``ratio`` times the size, with every other source of numerical error halved."""
     scene = on_larger(bench.scene, ratio)
     for vary in needed(bench, reference).values():
         scene = vary(scene)

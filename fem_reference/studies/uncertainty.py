@@ -72,7 +72,7 @@ def _trial(varied: Unknowns, parameters: Sequence[Parameter], point: Floats) -> 
 
 
 def _nominal(case: MuscleCase, reference: Run, store: Path, workers: Workers) -> tuple[Comparison, dict[str, str]]:
-    """The comparison of the case itself, with error bars, and the reasons by name why candidates did not reach all frames."""
+    """The comparison of the case itself, with error bars, and, by name, the reasons why candidates did not reach all frames."""
     bench = shared_bench(case, store)
     bars = refinement.bars(bench, reference, model=False)
     made = carry_out([Trial(case, one, one.name) for one in case.candidate], store, workers)

@@ -74,7 +74,7 @@ def with_distances[C: DrivenCase](case: C, factor: float, *keys: str) -> C:
 
 def with_half_steps[C: DrivenCase](case: C, settings: Record) -> Vary[C]:
     """A function that changes a case to load steps of at most half the length. As a step ends at each frame, ``frames.every`` also
-    limits the length of the steps of ``case``, which have the ``settings`` of its reference.
+    limits the length of the steps of ``case``. ``settings``: those of its reference.
     """
     own = settings.model_dump()
     largest = min(case.frames.every, own["largest_step"] or math.inf) / 2

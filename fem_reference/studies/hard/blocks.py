@@ -29,7 +29,7 @@ MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible
 _LINES, _POINTS = 4, 9  # the number of measured lines in each block, and of points on each line
 # The bones of attached faces are spheres far from the block; their radius and distance are relative to the size of the block.
 _BALL, _AWAY = 0.01, 50.0
-_SAME = 1e-9  # the maximum rounding difference between equal motions of two holds, relative to the block's size
+_SAME = 1e-9  # the maximum rounding difference between equal motions of two attachments, relative to the block's size
 
 
 def problem(hard: Hard) -> MuscleProblem:
@@ -80,7 +80,7 @@ def several(hard: Hard) -> MusclesProblem:
 
 
 def _named(name: str, one: MuscleProblem) -> MuscleProblem:
-    """The problem ``one``, with ``name`` as a prefix to the names of the bones of its holds."""
+    """The problem ``one``, with ``name`` as a prefix to the names of the bones of its attachments."""
     held = (replace(entry, bone=replace(entry.bone, name=f"{name}: {entry.bone.name}")) for entry in one.attached)
     return replace(one, attached=tuple(held))
 
@@ -164,7 +164,7 @@ def _held(block: Lattice, hold: Hold, nodes: Ints, surface: Surface) -> Attached
 
 
 def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> None:
-    """Raise InputError if two holds move shared vertices to different positions: most solvers would obey only one of the holds."""
+    """Raise InputError if two attachments move shared vertices to different positions: most solvers would obey only one of them."""
     assert hard.frames is not None  # a block has frames
     keyframes = (key.frame for hold in hard.hold if hold.motion for key in hold.motion.keyframes)
     frames = sorted({*hard.frames.numbers, *keyframes})
