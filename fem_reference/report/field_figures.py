@@ -206,7 +206,7 @@ class _Window:
 
 
 def _windows(points: Floats, anchors: Floats) -> list[_Window]:
-    """The entire surface, the belt around the mean height of ``points``, and the part around the fixed vertices ``anchors`` (k, 3)."""
+    """The entire surface, the belt around the mean height of ``points``, and the part around fixed vertices ``anchors`` (k, 3)."""
     height, extent = float(np.ptp(points[:, 1])), float(np.ptp(points, axis=0).max())
     windows = [_Window("whole", points.min(axis=0), points.max(axis=0), 0.0)]
     belt = points[np.abs(points[:, 1] - points[:, 1].mean()) < 0.1 * height]
