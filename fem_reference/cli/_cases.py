@@ -37,7 +37,7 @@ def scene_of(options: argparse.Namespace) -> Case:
 
 
 def muscle_case(case: str, options: argparse.Namespace, *, quick: bool) -> MuscleCase:
-    """The ``case`` of a muscle, with ``quick`` at its quick size; keys changed by ``--set`` take precedence."""
+    """The ``case`` of a muscle, at its quick size if ``quick``; keys changed by ``--set`` take precedence."""
     given = dict(map(casefile.setting, options.set))
     sizes = casefile.read_muscle(case, given).quick if quick else {}
     return casefile.read_muscle(case, sizes | given)

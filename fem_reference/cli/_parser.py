@@ -87,7 +87,7 @@ def verb(name: str) -> ModuleType:
 
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
-    """The parser of the command line; with ``only``, it has the options of this verb alone, as importing all takes seconds."""
+    """The parser of the command line; with ``only``, it has the options of this verb alone: importing all verbs takes seconds."""
     about = "Finite element reference and validation for muscle deformation."
     whole = argparse.ArgumentParser(prog="fem-reference", description=about)
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")

@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     scene, entry = bench.scene, by_muscle.of_part(whole.found(entry, place), place, muscle) if muscle else entry
     # Report errors in the baseline file before solving anything.
     (baseline.check if options.update else baseline.read)(options.baseline, scene, entry.name)
-    candidate = bench.obtain(entry.name, entry, place)  # before the reference, because the candidate may be bad input
+    candidate = bench.obtain(entry.name, entry, place)  # before the reference, because the candidate may be invalid
     solved = whole.reference()
     # The folder is that of the run of all muscles. The baseline stores its name, which contains a hash of the scene, the settings
     # and the code. If a neighbouring muscle has changed, the name differs from the stored name, and ``check`` reports this.

@@ -84,7 +84,7 @@ def _runs_of_several(case: Case, options: argparse.Namespace) -> int:
 
 
 def _with_states(bench: Bench[MuscleCase], *, again: bool) -> Run:
-    """The reference with its states. A reference that was solved without its states is solved again if ``again`` is True; otherwise
+    """The reference with its states. A reference whose states were not stored is solved again if ``again`` is True; otherwise
     InputError is raised.
     """
     choice = bench.scene.reference

@@ -1,4 +1,4 @@
-"""The verb ``run``: solve a case by its reference, or by another solver."""
+"""The verb ``run``: solve a case with its reference, or with another solver."""
 
 import argparse
 

@@ -1,4 +1,4 @@
-"""Self-contained pages, with their numbers also as JSON and CSV. No number is computed in this package.
+"""Self-contained pages, with their numbers also as JSON and CSV. The results are computed in other packages.
 
 Each kind of page has a module, whose function ``page`` makes the record that :func:`write` writes.
 """

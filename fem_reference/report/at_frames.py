@@ -41,7 +41,7 @@ def motions(bones: Iterable[Bone]) -> list[Column]:
 
 
 def label(case: Case, setup: Any, frame: int) -> str:
-    """A frame in words: its number, and in brackets its time and the motions of its bones."""
+    """A frame in words: its number, and in brackets its time and the motions of the bones."""
     known = [
         f"{one.name} {number(one.at(frame))}{'' if one.unit == '°' else ' '}{one.unit}" for one in columns(case, setup)
     ]

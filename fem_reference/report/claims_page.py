@@ -40,7 +40,7 @@ def page(claims: Claims) -> Page:
 
 
 def widest(claims: Claims, case: str, metric: str, statistic: str) -> Claim:
-    """The claim with the widest bar among those about the deviation of a statistic on a case."""
+    """The ``Claim`` with the widest error bar of the deviation of a statistic on a case."""
     found = [one for one in claims.claims if (one.case, one.metric, one.statistic) == (case, metric, statistic)]
     return max((one for one in found if one.of == "deviation"), key=lambda one: one.bar)
 

@@ -65,8 +65,8 @@ def _of_runs(comparison: Comparison, key: tuple[str, str], title: str, i: int | 
 def _draw_runs(
     comparison: Comparison, found: dict[str, Measure], along: Floats, shown: NDArray[np.bool_], axes: Axes
 ) -> None:
-    """Draw the measures ``found`` of the runs over ``along`` (f,) at the frames ``shown`` (f,), and the range over fibres of the
-    reference.
+    """Draw the measures ``found`` of the runs over ``along`` (f,) at the frames ``shown`` (f,), and for the reference
+    also the range over its fibres.
     """
     look_by_name = looks(run.name for run in comparison.runs)
     for i, run in enumerate(comparison.runs):

@@ -108,7 +108,7 @@ def looks(names: Iterable[str]) -> dict[str, dict[str, Any]]:
 
 
 def drawn(name: str, title: str, size: tuple[float, float], draw: Callable[[Figure, Axes], None]) -> Drawing:
-    """Make a drawing of ``size`` [in] by calling ``draw``. The ids in its SVG begin with ``name``."""
+    """Make a drawing of ``size`` [inches] by calling ``draw``. The ids in its SVG begin with ``name``."""
     with mpl.rc_context(LOOK):
         figure = Figure(figsize=size, layout="constrained")
         FigureCanvasSVG(figure)

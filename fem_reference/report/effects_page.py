@@ -19,7 +19,7 @@ MAIN = "surface_deviation.rms"
 HEADS = {
     ".".join(key): f"{one.title} ({one.part})".removesuffix(" ()").lower() for key, one in described("main").items()
 }
-# The axis ends at the smallest change that counts divided by this factor; smaller changes are drawn at its end, with their values.
+# The axis begins at the smallest change that counts, divided by this factor; smaller changes are drawn there, with their values.
 _DEPTH = 10.0
 
 

@@ -126,8 +126,8 @@ def _svg(name: str, title: str, draw: Callable[[Axes], None]) -> Drawing:
 
 
 def _panels(example: Comparison, draw: Callable[..., None]) -> Iterator[Drawing]:
-    """Drawings of the rival, the reference and their difference. The arguments of ``draw`` are the values (n,) at the vertices, all
-    values (k, n) that share the colour scale, and the name of the colour map.
+    """Drawings of the :func:`rival`, the reference and their difference. The arguments of ``draw`` are the values (n,) at the
+    vertices, all values (k, n) that share the colour scale, and the name of the colour map.
     """
     reference, other = example.reference, rival(example)
     solutions = [run.vertex_values[-1] for run in (reference, other) if run is not None]
@@ -206,7 +206,7 @@ class _Window:
 
 
 def _windows(points: Floats, anchors: Floats) -> list[_Window]:
-    """The windows: the entire surface, the belt around the mean height of ``points``, and the part around ``anchors`` (k, 3)."""
+    """The entire surface, the belt around the mean height of ``points``, and the part around fixed vertices ``anchors`` (k, 3)."""
     height, extent = float(np.ptp(points[:, 1])), float(np.ptp(points, axis=0).max())
     windows = [_Window("whole", points.min(axis=0), points.max(axis=0), 0.0)]
     belt = points[np.abs(points[:, 1] - points[:, 1].mean()) < 0.1 * height]
@@ -220,7 +220,7 @@ def _windows(points: Floats, anchors: Floats) -> list[_Window]:
 
 
 def _body(figure: Figure, example: Comparison, values: Floats, scale_of: Floats, colours: str) -> None:
-    """Draw a surface in space with y up, as seen along z from the side of its anchors. Each window has its own colour scale."""
+    """Draw a surface in space with y up, seen along z from the side of its fixed vertices. Each window has a colour scale."""
     mesh = example.setup.mesh
     anchors = mesh.points[~np.isnan(example.setup.fixed[: len(mesh.points)])]
     behind = len(anchors) > 0 and anchors[:, 2].mean() < mesh.points[:, 2].mean()

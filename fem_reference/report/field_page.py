@@ -14,7 +14,7 @@ from fem_reference.report.tables import MEASURES, as_csv, summary
 from fem_reference.report.words import number
 from fem_reference.runs.store import Run
 
-AGREE = 1e-9  # a difference below this fraction of the maximum is rounding
+AGREE = 1e-9  # a difference below this fraction of the maximum is due to rounding
 
 
 def page(title: str, examples: tuple[Comparison, ...]) -> Page:

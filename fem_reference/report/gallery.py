@@ -116,7 +116,7 @@ def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
     """Unit vectors (2, 3) towards the cameras, along the shortest and the middle principal axis of the surface.
 
     The first view shows the largest silhouette, and the second is rotated by 90 degrees about the long axis. Both cameras are on
-    the side away from the bones' vertices. If a bone in closed form hides the surface along an axis, this axis is used last.
+    the side away from the bones' vertices. An axis along which bones with analytic shapes hide the surface is used last.
     """
     middle = surface.points.mean(axis=0)
     spread = np.cov((surface.points - middle).T)
@@ -131,7 +131,7 @@ def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
 
 
 def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
-    """True if bones in closed form hide most of ``points`` (n, 3) from a viewer at a distance of four times ``view`` (3,)."""
+    """True if bones with analytic shapes hide most of ``points`` (n, 3) from a viewer at a distance of four times ``view`` (3,)."""
     behind = np.zeros(len(points), bool)
     for solid in (bone.solid for bone in bones if bone.solid is not None):
         for step in np.arange(1, 17) / 4:

@@ -88,7 +88,7 @@ def write(page: Page, folder: Path, name: str, asked: str = "") -> Path:
 
 
 def stamped(page: Page, asked: str = "") -> str:
-    """The page as HTML, with the facts in its head, and with the command that made it above the title."""
+    """The page as HTML, with the facts in its head and, above the title, the command that made it."""
     text = page.html()
     made = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M") if asked else ""
     head = PageHead(page.kind, page.title, page.headlines, asked, made, small_picture(text))

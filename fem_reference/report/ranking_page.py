@@ -18,7 +18,7 @@ from fem_reference.report.words import under_load
 
 # The columns of the tables of scenes: metric, statistic, heading, unit.
 COLUMNS = tuple((*key, one.label, one.full_unit) for key, one in described("solvers").items())
-# The columns of the first table, which is over all scenes.
+# The columns of the first table, which covers all scenes.
 OVER_ALL = tuple((*key, one.label, one.full_unit) for key, one in described("scenes").items())
 _MARKS = "osD^vPX*<>"
 

@@ -1,4 +1,4 @@
-"""A recommended setting in words: as text and as JSON."""
+"""A recommended setting, as text and as JSON."""
 
 import math
 from collections.abc import Iterable
@@ -61,7 +61,7 @@ def text(found: Recommendation, case: str, metric: str, unit: str, limit: float)
 
 
 def answer_texts(found: Iterable[Answer], unit: str) -> list[str]:
-    """A sentence for each answer: the request, the setting, its error in a ``unit`` including the truth's bar, and its time."""
+    """A sentence for each answer: the request, the setting, its error in ``unit`` with the error bar of the truth, and its time."""
     return [f"{asked_for(one, unit)}: {_answer(one, unit)}" for one in found]
 
 

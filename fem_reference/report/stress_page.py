@@ -20,7 +20,7 @@ _VIEW = np.array([-0.55, 0.7, -0.45])
 _MARK = "#3b6cf0"
 _LIT, _DARK, _BACK, _EDGE = (205, 120, 110), (120, 55, 48), (90, 130, 190), (60, 30, 26)
 _NO_PAPER = (255, 255, 255, 0)  # a transparent background, for light and dark pages
-_LEFT, _RIGHT, _TOP, _FLOOR = 52, 290, 8, 120  # the ends of the axes in a drawing of 300 by 150
+_LEFT, _RIGHT, _TOP, _FLOOR = 52, 290, 8, 120  # the ends of the axes in a drawing of 300 by 150 units
 
 
 def page(found: Stress) -> Page:
@@ -79,7 +79,7 @@ def picture(scene: Scene) -> str:
 
 
 def _colour(facing: float) -> tuple[int, int, int]:
-    """The colour of a triangle whose normal has this component along the view: if it is negative, the outer side is visible."""
+    """The colour of a triangle whose normal has the component ``facing`` along the view: if negative, the outer side is visible."""
     if facing > 0:
         return _BACK
     red, green, blue = (round(dark + (lit - dark) * -facing) for dark, lit in zip(_DARK, _LIT, strict=True))

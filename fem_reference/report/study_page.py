@@ -114,7 +114,7 @@ def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Mat
     rows.
     """
     asked = [(case.counted, cost, cost, error) for cost in MATCHED]
-    # An error of "at most" a value includes the bar of the truth, as in the verb recommend.
+    # An error of "at most" a value includes the bar of the truth, as in the verb ``recommend``.
     asked.append((case.certain, TIME, error, TIME))
     return [
         (
@@ -127,7 +127,7 @@ def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Mat
 
 
 def answered(case: CaseStudy) -> tuple[Answer, ...]:
-    """The answers to the usual requests, from the settings that the verb recommend considers; empty for a case without settings."""
+    """The answers to the usual requests, from the settings that the verb ``recommend`` considers; empty without settings."""
     known = known_settings(case.features, case.case, [case], MAIN).settings
     return answers(known) if known else ()
 
@@ -183,8 +183,8 @@ def _draw_answers(axes: Axes, found: Iterable[Answer]) -> None:
 
 
 def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
-    """Pairs of a point with its measured error, which may be below the error bar of the truth, and the point with the error that
-    counts.
+    """Pairs of a point with its measured error, which may be below the error bar of the truth, and the same point with the error
+    that counts.
     """
     return [
         (replace(point, errors=point.errors or counted.errors), counted)
@@ -193,7 +193,7 @@ def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
 
 
 def _draw(axes: Axes, points: Sequence[tuple[Point, Point]], error: str, solver: str, colour: str) -> None:
-    """Draw the points of a solver as dots, the front of the errors that count as a line, and default settings as rings."""
+    """Draw the points of a solver as dots, default settings as rings and, as a line, the front of the errors that count."""
     pairs = [(point, pair) for point, _ in points if (pair := point.at(error, TIME))]
     if not pairs:
         return

@@ -120,7 +120,7 @@ def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
 
 
 def _bar_rows(comparison: Comparison, bar: ErrorBar) -> list[dict[str, Any]]:
-    """One row for each frame of an error bar. The key ``model`` has the change of the statistic with another model of springs."""
+    """One row for each frame of an error bar. The key ``model`` has the change of the statistic under another spring model."""
     columns = {"of": bar.of, "metric": bar.metric, "statistic": bar.statistic, "unit": bar.unit}
     model = [None] * len(bar.values) if bar.model is None else [finite(value) for value in bar.model]
     return [

@@ -23,7 +23,7 @@ _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "second
 PASS, FAIL = "#14713a", "#b3261e"
 # The range of error / tolerance in the overview; values outside the range are drawn at its edge.
 LEAST, GREATEST = 1e-8, 1e3
-_ROW = 0.175  # height of a row of the overview [in]
+_ROW = 0.175  # height of a row of the overview [inches]
 
 
 def page(verification: Verification) -> Page:
@@ -92,7 +92,7 @@ def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
 
 
 def share(one: Result) -> float:
-    """The error divided by its tolerance; NaN if nothing was measured, infinite for any error if the tolerance is 0."""
+    """The error divided by its tolerance; NaN if nothing was measured. With a tolerance of 0, it is infinite for any error."""
     if one.within > 0:
         return one.error / one.within
     return one.error * math.inf if one.error else 0.0

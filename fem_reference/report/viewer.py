@@ -177,7 +177,7 @@ def _stops(name: str) -> list[str]:
 
 
 def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> tuple[list[dict[str, Any]], float]:
-    """The facts of every run, and the ``top`` of the colours: the maximum distance to the reference over frames inside the box."""
+    """The facts of every run, and the end of the colour scale: the maximum distance to the reference over frames inside the box."""
     rows, top = [], 0.0
     for name, positions in frames.items():
         inside = ((positions >= box.low - box.step) & (positions <= box.low + (_LEVELS + 1) * box.step)).all(axis=2)

@@ -74,7 +74,7 @@ class Fields:
 
     @cached_property
     def gaps(self) -> dict[str, Floats | None]:
-        """Distances (f, n) [mm] from vertices to the bones by name of the run; NaN for exempt vertices, None if a bone has no
+        """Distances (f, n) [mm] of vertices from the bones, by name of the run; NaN for exempt vertices, None if a bone has no
         inside.
         """
         found = {run.name: (run, local_fields.to_bones(run, self.context)) for run in self.runs}

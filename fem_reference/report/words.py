@@ -43,7 +43,7 @@ def duration(seconds: float | None) -> str:
 
 
 def under_load(shares: Iterable[float], most: float) -> str:
-    """A warning if other processes kept more than the fraction ``most`` of the machine busy during measurements; NaN: unknown.
+    """A warning if any of ``shares``, the fractions of the machine that other processes kept busy (NaN: unknown), exceeds ``most``.
 
     >>> under_load([0.02, 0.5, 0.25], 0.1)
     '2 of 3 times were measured while other processes kept 25 % to 50 % of the machine busy: undisturbed runs take less time'

@@ -36,7 +36,7 @@ def is_of_body(reference: object, of: object) -> bool:
 
 
 def check_muscle(name: object, case: object, place: str = "muscle") -> None:
-    """Raise InputError at ``place`` unless ``name`` is a muscle of a ``case`` of several muscles, or empty for any other case."""
+    """Raise InputError at ``place`` unless ``name`` is a muscle of the ``case``, or empty if the case does not have several."""
     names = [one.name for one in case.muscle] if isinstance(case, MusclesCase) else []
     if name not in (names or [""]):
         got = f'"{name}"' if isinstance(name, str) else said(name)
@@ -44,21 +44,21 @@ def check_muscle(name: object, case: object, place: str = "muscle") -> None:
 
 
 def check_keys(keys: object) -> Sequence[str]:
-    """Return the ``keys``. Raises InputError unless they are a list of texts."""
+    """Return the ``keys``. Raises InputError unless they are a list of strings."""
     if not isinstance(keys, Sequence) or isinstance(keys, str) or not all(isinstance(key, str) for key in keys):
         raise InputError("fit", said(keys), 'a list of keys, such as ["effect[0].mu"]')
     return keys
 
 
 def check_changes(changes: object) -> None:
-    """Raise InputError unless ``changes`` are values by key, or None."""
+    """Raise InputError unless ``changes`` maps keys to values or is None."""
     keys = () if changes is None else tuple(changes) if isinstance(changes, Mapping) else (None,)
     if not all(isinstance(key, str) for key in keys):
         raise InputError("changes", said(changes), 'values by key, such as {"frames.last": 10}')
 
 
 def check_solver(solver: object, settings: Mapping[str, object], muscle: str = "") -> None:
-    """Raise InputError unless ``solver`` is a name or a function, or None without ``settings`` and without a ``muscle``."""
+    """Raise InputError unless ``solver`` is a name, a function or None; with ``settings`` or a ``muscle`` it cannot be None."""
     if solver is None and muscle:
         raise InputError("muscle", said(muscle), "a solver for it, as the reference solves all muscles together")
     if solver is not None and not isinstance(solver, str) and not hasattr(solver, "__name__"):
@@ -94,7 +94,7 @@ def check_error_bars(bars: object, case: Case) -> None:
 
 def check_run(given: object, case: Case, place: str) -> None:
     """Raise InputError unless ``given`` is a run of the same kind as the ``case`` (muscle or field). If the run names the case that
-    it solved, this must be the ``case``.
+    it solved, it must name this ``case``.
     """
     run = check(given, Run, place, "a Run, such as solve and read_run return")
     scene, effects, place = run.origin.get("scene"), run.origin.get("effects"), f'{place} "{run.name}"'

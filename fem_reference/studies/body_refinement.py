@@ -14,7 +14,7 @@ from fem_reference.solvers import fenicsx
 
 log = logging.getLogger(__name__)
 
-# A quadratic element has as many unknowns on the same cells as a linear one on cells of half the size, and does not lock.
+# On the same cells, quadratic elements have as many unknowns as linear ones on cells of half the size, and they do not lock.
 _QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
 
 
@@ -40,11 +40,11 @@ def body_bars(solved: Run) -> BodyBars | None:
 def sharper_problem(
     body: Body, settings: fenicsx.BodySettings
 ) -> tuple[Body, Ints, dict[str, float | str | None], str]:
-    """A more accurate problem: the new body, the indices in the new body of the points of ``body``, the changed settings, and a
+    """A more accurate problem: the new body, the indices of the points of ``body`` in the new body, the changed settings, and a
     description of the changes.
     """
     changes, said = dict[str, float | str | None](store_state=False), ""
-    # Without friction and without effects that need the step's interval, a state does not depend on load steps.
+    # Without friction and without effects that need the time between frame numbers, a state does not depend on the load steps.
     if body.rubs or any("interval" in effect.needs for effect in body.effects):
         largest = min(settings.largest_step or np.inf, float(np.diff(body.frames).max(initial=settings.first_step)))
         changes |= {"first_step": settings.first_step / 2, "largest_step": largest / 2}

@@ -24,7 +24,7 @@ class ByMuscle:
     """Comparisons of the ``muscles`` of a case, by name of the muscle.
 
     Each row of ``worst`` contains a solver, the names of two muscles, the maximum depth [mm] to which the solver lets them overlap,
-    and the frame of the maximum. ``lacking``: pairs of a candidate and a muscle of which the candidate has no frames.
+    and the frame of the maximum. ``lacking``: pairs of a candidate and a muscle for which the candidate has no frames.
     """
 
     muscles: dict[str, Comparison]
@@ -39,7 +39,7 @@ class ByMuscle:
 
 
 def compared(bench: Bench[Case], chosen: Sequence[tuple[Candidate, str]], *, error_bars: bool = False) -> ByMuscle:
-    """Compare, for each of several muscles, its part of the common reference with the candidates that solve this muscle alone.
+    """Compare each muscle's part of the common reference with the candidates that solve this muscle alone.
 
     Recorded frames are read from folders named after the muscles; a candidate may lack frames of some muscles. With ``error_bars``,
     error bars are computed; otherwise only stored ones are used.

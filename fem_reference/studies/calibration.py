@@ -138,7 +138,7 @@ def _values(case: MuscleCase, run: Run, rows: Sequence[Measurement], store: Path
 def _value(run: Run, row: Measurement, changes: Sequence[Measure]) -> float:
     """The value that a ``run`` predicts for the measurement ``row``.
 
-    ``changes``: measures of the run relative to rest. They supply the value if the quantity of the row is a statistic of a metric.
+    ``changes``: measures of the run's change from rest, which supply the value if the quantity is a statistic of a metric.
     """
     kind, name, axis = _split(row.quantity)
     i = run.numbers.index(row.frame)

@@ -1,4 +1,4 @@
-"""Many runs at once, in processes of this machine or on the workers of a Dask cluster; each run is stored as soon as it ends.
+"""Many runs at once, in processes on this machine or on the workers of a Dask cluster; each run is stored as soon as it ends.
 
 If a worker dies, only the run that it was solving is lost, and another worker repeats it. Stored runs are reused, so an interrupted
 campaign continues where it stopped.
@@ -33,7 +33,7 @@ _BENCHES: dict[tuple[str, Path, Path], Bench[MuscleCase]] = {}
 
 @dataclass(frozen=True)
 class Workers:
-    """Workers that solve runs: ``count`` processes of this machine, or the workers of the Dask scheduler at an ``address``.
+    """Workers that solve runs: ``count`` processes on this machine, or the workers of the Dask scheduler at an ``address``.
 
     Dask-jobqueue, for example, starts such a scheduler on a cluster. All workers need access to the store. Raises InputError if
     ``count`` is below one.
@@ -168,7 +168,7 @@ def _loaded(folder: Path, trial: Trial) -> Run:
 
 @contextmanager
 def _executor(workers: Workers) -> Iterator[Executor]:
-    """Processes of this machine, or the workers of a Dask scheduler, which gives the run of a dead worker to another worker."""
+    """Processes on this machine, or the workers of a Dask scheduler, which gives the run of a dead worker to another worker."""
     if workers.address is None:
         # Processes are spawned, because numba, PETSc and locks do not survive a fork.
         before = set(multiprocessing.active_children())

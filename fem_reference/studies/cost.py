@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 # The metrics of every point of the study; the joint moment is computed only for solvers that provide forces.
 METRICS = (*in_tables(), "joint_moment")
-# Surface solvers also run on 4**power times as many triangles; these surfaces are stored with the runs.
+# Surface solvers also run on surfaces with 4**power times as many triangles; these surfaces are stored with the runs.
 _POWERS = (-1, 1)
 _MOST_TRIANGLES = 20_000  # with more triangles a run takes minutes, which would be most of a study's time
 SURFACES = "surfaces"
@@ -40,13 +40,13 @@ _CLAIMING = 4
 
 
 def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Collection[str] = ()) -> Study:
-    """Study each of ``scenes``, and solve runs that are missing in ``store``. If ``only`` names solvers, study only these."""
+    """Study each of ``scenes``, and solve runs that are missing from ``store``. If ``only`` names solvers, study only these."""
     cases, missing = each({scene.name: scene for scene in scenes}, lambda case: _of(case, store, workers, only))
     return Study(tuple(cases.values()), missing, made_with(str(workers)))
 
 
 def stored(folder: Path) -> list[CaseStudy]:
-    """Read the studies below ``folder``, one for each case, preferably from the folder that is named after the case.
+    """Read the studies inside ``folder``, one for each case, preferably from the folder that is named after the case.
 
     Points of further studies with the same truth, such as those of a user's own solver, are added. Raises InputError if there is no
     study.
@@ -126,7 +126,7 @@ def _point(one: Made, truth: Run, context: MeasurementContext) -> Point:
 
 
 def settings_of(trial: Trial) -> dict[str, object]:
-    """The settings of a trial that differ from the defaults of its solver, and the hash of the program that it runs, if any."""
+    """The settings of a trial that differ from the defaults of its solver and, for a program, the hash of the program."""
     given = trial.choice.settings
     try:
         own = solvers.settings(trial.choice, trial.name)
@@ -140,7 +140,7 @@ def settings_of(trial: Trial) -> dict[str, object]:
 
 def greatest(run: Run, truth: Run, context: MeasurementContext, names: Collection[str]) -> dict[str, float]:
     """The maximum magnitude over frames of each deviation of a ``run`` from the ``truth``, by ``metric.statistic``, for the metrics
-    ``names``; NaN if a value is NaN.
+    in ``names``; NaN if a value is NaN.
     """
     found = measure(complete(run, truth.numbers), truth, context, names)
     return {f"{one.metric}.{one.statistic}": float(np.abs(one.values).max()) for one in found}
@@ -164,7 +164,7 @@ def costs(run: Run) -> dict[str, float]:
 
 
 def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store: Path) -> tuple[Claim, ...]:
-    """Claims of error bars for runs of the reference on coarser meshes, with the differences of these runs from the truth."""
+    """Error bars of runs of the reference on coarser meshes, with the differences of these runs from the truth."""
     found = list[Claim]()
     on_tetrahedra = [one for one in made if (one.trial.name, one.trial.knob) == ("reference", TETRAHEDRA)]
     members = [(one.trial, run) for one in on_tetrahedra if (run := one.reached) is not None]

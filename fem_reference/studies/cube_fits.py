@@ -42,7 +42,7 @@ def shipped_law() -> Fitted:
 
 def collagen_law(most: int = _MOST) -> Fitted:
     """Fit the law with collagen across the fibres to all quantities except rankings, which have no derivative. ``most``: the
-    maximum number of evaluations. Only the fibres have a published range, as we know of no published ``k1`` and ``k2`` of this law.
+    maximum number of evaluations. Only the stress of the fibres has a published range: we know of no published ``k1`` and ``k2``.
     """
     to = [one for one in QUANTITIES if not one.is_order]
     ended = _fitted(lambda values: with_collagen(*values), to, (FIBRES["stress"] / 2, 0.1, 10.0), most)

@@ -48,7 +48,7 @@ VERSION = "1.0.0"
 SHIPPED = ("hip_flexion",)  # cases with the project's own geometry, without anatomy under another licence
 INDEX = "dataset.json"
 _TEST = 0.25  # the fraction of poses, and of shapes, in the test part
-_SAME = 0.01  # the relative difference of volume and principal moments below which shapes are the same
+_SAME = 0.01  # shapes are the same if lengths from volume and principal moments differ by less than this fraction of the size
 
 
 @dataclass(frozen=True)
@@ -213,8 +213,8 @@ def _inside(run: Run, case: MuscleCase) -> Arrays:
 def splits(found: dict[str, Arrays], seed: int) -> dict[str, dict[str, dict[str, list[int]]]]:
     """Indices of frames by scene, for the parts ``train`` and ``test`` of two splits.
 
-    ``pose``: frames of a scene with equal poses are in the same part, and rest is in ``train``. ``shape``: all scenes with the same
-    shape of muscle are in the same part.
+    ``pose``: frames of a scene with equal poses and activation are in the same part, and rest is in ``train``. ``shape``: all
+    scenes with the same shape of muscle are in the same part.
     """
     rng, names = np.random.default_rng(seed), list(found)
     parts: dict[str, dict[str, dict[str, list[int]]]] = {key: {"train": {}, "test": {}} for key in ("pose", "shape")}

@@ -119,7 +119,7 @@ def _flat(points: Floats) -> Floats:
     """Points (n, 3) of an area relative to their mean, in the principal axes of the area (the last is normal to it), and sorted
     along the first axis.
 
-    The result does not depend on the axes of the scene or the order of the points, as third moments along the axes are positive.
+    The result does not depend on the axes of the scene or the order of the points: third moments along the axes are made positive.
     """
     away = points - points.mean(axis=0)
     flat = away @ np.linalg.svd(away, full_matrices=False)[2].T
@@ -128,7 +128,7 @@ def _flat(points: Floats) -> Floats:
 
 
 def _centres(points: Floats, heights: Floats, count: int) -> Iterator[tuple[str, Floats]]:
-    """The name and the centres (count, 2) of each choice of the report's section 3.5.1."""
+    """The name and the centres (count, 2) of each choice in the report's section 3.5.1."""
     yield "grid", radial_basis.grid_centres(points, count)
     yield "Halton", radial_basis.halton_centres(points, count)
     yield "greedy", radial_basis.greedy_centres(points, heights, count, 1.0, terms=_POLYNOMIAL)

@@ -175,7 +175,7 @@ class Bench[C: Case]:
         return other._run(name, choice, place, lambda _: None)
 
     def _run(self, name: str, choice: SolverChoice, place: str, make: Callable[[Wanted], Run | None]) -> Run | None:
-        """The stored run or, without one, the run from ``make``; repeated with all effects that turn out to matter."""
+        """The stored run or, without one, the run from ``make``. It is repeated with all effects that turn out to matter."""
         if choice.solver == "recorded":  # read each time, as files may change under the same name
             return self.read(name, choice, place)
         offer = solvers.find(choice.solver, place, self.scene.task)
@@ -222,7 +222,7 @@ class Bench[C: Case]:
         return ("converged", "denied", *(("stopped",) if self._watched(solver) else ()))
 
     def _checked(self, run: Run) -> Run:
-        """The ``run``, with a second check (stored with the run) if the case is of muscles and the solver models effects."""
+        """The ``run``; with a second check, stored with the run, if the case has muscles and the solver models effects."""
         asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
         if not asked or run.outcome.status not in ("converged", "denied"):
             return run

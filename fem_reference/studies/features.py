@@ -21,14 +21,14 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 # Measured on hip_flexion: processor time [s] of a Newton iteration with this number of unknowns, the exponent with which the time
 # grows with that number, and iterations per frame.
 _SECONDS, _UNKNOWNS, _EXPONENT, _ITERATIONS = 0.13, 5456, 1.15, 4
-# With contact between parts: the number of iterations in which attachments move by the length of a facet's edge, which limits load
-# steps; and the additional processor time [s] of an iteration. Measured numbers of iterations: 12 in two_muscles, 23 on larger
+# With contact between parts: the number of iterations in which attachments move by the length of a facet's edge (which limits load
+# steps), and the additional processor time [s] of an iteration. Measured numbers of iterations: 12 in two_muscles, 23 on larger
 # tetrahedra, 31 in hip_four_muscles.
 _PER_EDGE, _CONTACT = 15, 0.1
 
 
 class ExpectedCost(NamedTuple):
-    """The number of ``unknowns`` of a problem, and the processor time [s], within a factor of three, and memory [MB] of FEniCSx."""
+    """The number of ``unknowns`` of a problem, the processor time [s] of FEniCSx within a factor of three, and its memory [MB]."""
 
     unknowns: int
     seconds: float

@@ -16,7 +16,7 @@ _WANT = "an undamaged folder or archive (zip, tar) with published data"
 
 
 class Listed(Record):
-    """Size [bytes] and SHA-256 of files by path below the data folder: ``published`` files, and files ``made`` from these."""
+    """Size [bytes] and SHA-256 of files by path in the data folder: ``published`` files, and files ``made`` from these."""
 
     licence: str
     published: dict[str, tuple[int, str]]
@@ -29,10 +29,10 @@ def known() -> Listed:
 
 
 def fetch(sources: Sequence[Path], folder: Path, wanted: Listed) -> list[str]:
-    """Write each file of ``wanted`` that the ``sources`` contain into a new ``folder``; return the paths of these files below it.
+    """Write each file of ``wanted`` that the ``sources`` contain into a new ``folder``; return the paths of these files in it.
 
-    A source is a folder or an archive; names of files in it are ignored. If no file is found, a source is damaged or ``folder`` is
-    in use, InputError is raised and no folder is made.
+    A source is a folder or an archive; names of files in it are ignored. Raises InputError and makes no folder if no file is
+    found, if a source is damaged, or if ``folder`` is in use.
     """
     found, files = set[str](), wanted.published | wanted.made
     sizes = {size for size, _ in files.values()}
@@ -55,7 +55,7 @@ def cases_with(found: Collection[str]) -> list[str]:
 
 
 def _contents(source: Path, sizes: Collection[int]) -> Iterator[bytes]:
-    """The contents of the files in a folder or an archive whose size is one of ``sizes`` [bytes]."""
+    """The contents of those files in a folder or an archive whose size is one of ``sizes`` [bytes]."""
     try:
         if source.is_dir():
             paths = [path for path in source.rglob("*") if path.is_file() and path.stat().st_size in sizes]

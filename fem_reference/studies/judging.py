@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 _REFINEMENTS = {2: 5, 3: 3}  # the maximum number of refinements, by the number of vertices of a cell
 _MOST_CELLS = 100_000
-_EXACT = 1e-9  # errors below this fraction of the solution are rounding, and show no order
+_EXACT = 1e-9  # errors below this fraction of the solution are due to rounding, and show no order
 
 
 def compare(
@@ -72,8 +72,8 @@ def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Convergence]:
     def error(built: FieldProblem, values: Floats) -> float:
         if exact is not None:
             return l2_distance(built.mesh, values, partial(scalar.at, exact))
-        # The vertices of a mesh come first in every finer mesh. The error is taken over all vertices of this mesh: at those of an
-        # irregular coarsest mesh alone it would converge like h^2 log h, not like h^2.
+        # The vertices of a mesh come first in every finer mesh. The error is taken over all vertices of this mesh: taken over
+        # those of an irregular coarsest mesh alone, it would converge like h^2 log h, not like h^2.
         count = len(built.mesh.points)
         return float(np.sqrt(np.mean((values[:count] - truth[:count]) ** 2)))
 

@@ -1,7 +1,7 @@
 """Split of the error of a solver with tetrahedra into parts due to effects left out, its law, its mesh and its convergence.
 
-Each intermediate reference changes one more thing: first the effects are left out, then the solver's law is used, then its linear
-tetrahedra.
+Each intermediate reference changes one more thing: first, effects that the solver lacks are left out; then its law is used; then
+its linear tetrahedra are used.
 """
 
 import math

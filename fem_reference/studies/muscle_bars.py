@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 def check(bench: Bench[Case]) -> None:
     """Raise InputError if a case has to be solved but cannot have error bars, as it cannot be set up with larger tetrahedra."""
     if store.finished(bench.folder(bench.scene.reference, "reference")):
-        return  # nothing that takes long comes before its bars
+        return  # its error bars are computed next, which reports the problem at once
     if bench.scene.parts:
         refinement.coarser(cast("Bench[MusclesCase]", bench))
     else:
@@ -59,7 +59,7 @@ def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> dict[st
 
 
 def _parted(run: Run, reference: Run, names: Iterable[str]) -> Run:
-    """The ``run`` of a muscle, with zero force on each of the ``names`` that it cannot touch but the ``reference`` can: with less
+    """The ``run`` of a muscle, with zero force on each of the muscles ``names`` that only the ``reference`` can touch: with less
     smoothing, contact acts at shorter distances, and fewer muscles are near enough.
     """
     none = 0.0 * run.positions[:, 0, 0]  # NaN in frames that are not known
@@ -69,7 +69,7 @@ def _parted(run: Run, reference: Run, names: Iterable[str]) -> Run:
 
 
 def _safety(bench: Bench[MusclesCase], parts: dict[str, Bench[MuscleCase]], name: str) -> float:
-    """The factor of safety of a muscle: the greatest of its own and of those that it may touch, whose errors reach it."""
+    """The factor of safety of a muscle: the greatest of its own and those of muscles that it may touch, whose errors reach it."""
     problem = bench.problem()
     assert isinstance(problem, MusclesProblem)
     near = {name}.union(*(pair for pair in problem.pairs if name in pair))
@@ -82,7 +82,7 @@ def bars(bench: Bench[Case], reference: Run, name: str) -> ErrorBars | None:
 
 
 def offered(bench: Bench[Case], reference: Run, name: str, *, asked: bool) -> ErrorBars | None:
-    """The error bars of the muscle ``name``, stored ones unless ``asked`` for; without a name, of the only muscle of a case."""
+    """The error bars of the muscle ``name`` (if empty, of the only muscle): new ones if ``asked`` for, else stored ones."""
     if not name:
         return refinement.offered(bench, reference, asked=asked)
     return (obtain if asked else stored)(bench, reference).get(name)

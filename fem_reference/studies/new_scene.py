@@ -26,8 +26,8 @@ _GUESSED = ("mm", "cm", "m", "in")
 _LONG = {"muscle": (20.0, 700.0), "bone": (5.0, 2500.0)}
 # The maximum distance of a muscle from its bones, relative to the length of the muscle; beyond it the files do not fit together.
 _APART = 0.5
-# The fractions of the muscle's vertices, nearest to a bone, that are attached. The largest fraction is used for which the two
-# attachments share no vertices.
+# The possible fractions of the muscle's vertices that are attached to a bone: those nearest to it. The largest fraction for which
+# the two attachments share no vertices is used.
 _ATTACHED = (0.06, 0.04, 0.025, 0.015, 0.008)
 _TETS, _REFINEMENTS = 5000, 1
 _LONGEST = 60  # the maximum number of characters of a name that is changed because it does not suit scenes or files
@@ -57,7 +57,7 @@ def copied(case: str, folder: Path) -> None:
 
 
 def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | None) -> Unit:
-    """Write a scene with surfaces in mm into a new ``folder``, which names the scene; return the unit in which files were read.
+    """Write a scene with surfaces in mm into a new ``folder`` of the same name; return the unit in which files were read.
 
     ``muscle`` and ``bones`` are files of triangles. The muscle is attached to the two bones nearest to it, of which the second
     moves. ``unit``: the unit of all files, one of ``LENGTH_UNITS``. If it is None, the unit is guessed: the only one that gives
@@ -141,8 +141,8 @@ def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
 
 
 def _welded(surface: Surface, unit: float) -> Surface:
-    """The surface in mm with equal points merged, as STL files have three points for each triangle. ``unit``: its unit [mm]. The
-    order of points is kept, and triangles whose corners are merged with each other are removed.
+    """The surface in mm with equal points merged, as STL files have three points for each triangle. ``unit``: its unit of length
+    [mm]. The order of points is kept, and triangles whose corners are merged with each other are removed.
     """
     points = surface.points * unit
     _, first, which = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
@@ -181,7 +181,8 @@ def _text(name: str, muscle: Surface, bones: dict[str, Surface], paths: dict[str
     wanted = np.cbrt(6 * np.sqrt(2) * volume / _TETS * 8**_REFINEMENTS)
     size = min(float(wanted), float(np.ptp(muscle.points, axis=0).min()) / 2)
     source, moving = _cleaned(Path(muscle.place).name), ends[1].bone
-    others = [bone for bone in bones if bone != moving]  # the moving bone comes last, before its motion
+    # The moving bone comes last, because its motion follows in the template.
+    others = [bone for bone in bones if bone != moving]
     axis, centre = _joint(muscle, bones, ends)
     surfaces = "\n".join(
         f'[[bone]]\nname = {toml_text(bone)}\nsurface = {toml_text(paths[bone])}\nunit = "mm"\n'

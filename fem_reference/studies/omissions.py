@@ -35,7 +35,7 @@ LIMIT, COMPILING = 2.0, 60.0
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A part of a trial to leave out: ``effects`` of the scene, ``features`` of the solver, ``support`` by contact at rest."""
+    """A part of a trial to leave out: ``effects``, ``features`` of the solver and, with ``support``, support by contact at rest."""
 
     effects: dict[str, Effect]
     features: tuple[str, ...] = ()
@@ -106,7 +106,7 @@ def parts(whole: Trial) -> tuple[LeftOut, ...]:
 
 
 def _with_rest(case: MuscleCase, some: dict[str, Effect], named: dict[str, Effect]) -> LeftOut:
-    """The part that consists of ``some`` of the ``named`` effects and, with tension at rest, of everything that it balances."""
+    """The part with ``some`` of the ``named`` effects and, if these include tension at rest, with everything that it balances."""
     if in_situ.among(some.values()) is None:
         return LeftOut(some)
     first, contact = case.frames.first, among(case.effects)
@@ -208,7 +208,7 @@ def _omission(one: Made, left_out: tuple[str, ...]) -> Omission:
 
 
 def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:
-    """The displacement of the surface due to the effect left out, estimated by its indicator; empty unless it is just one."""
+    """The displacement of the surface due to an omitted effect, estimated by its indicator; empty unless exactly one is omitted."""
     if len(part.effects) != 1:
         return {}
     (left_out,) = part.effects.values()

@@ -11,8 +11,9 @@ from fem_reference.io import files
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 
-EVERY = 10  # the difference of the frame numbers of successive poses
-_AROUND, _ALONG = 20, 21  # the number of vertices around and along each surface; vertices with equal index correspond
+EVERY = 10  # the difference between the frame numbers of successive poses
+# The number of vertices around and along each surface. Vertices with the same index in two muscles correspond.
+_AROUND, _ALONG = 20, 21
 _TETS = 150  # the approximate number of tetrahedra, each of which is then cut into eight
 _MOTION = "motion = {{ {kind}, keyframes = [{keys}] }}\n"
 _OBSTACLE = """
@@ -105,7 +106,7 @@ def write(folder: Path, seed: int, number: int, poses: int) -> MuscleCase:
 
 
 def _drawn(rng: np.random.Generator, surface: Surface, number: int, poses: int) -> dict[str, object]:
-    """Material, fibres and motion of muscle ``number``, as texts for its case file."""
+    """Material, fibres and motion of muscle ``number``, as text for its case file."""
     length, side = surface.points[:, 2].max(), surface.points[:, 1].max()
     leans, arm, mu = rng.uniform(0, 2 * np.pi), rng.uniform(12, 30), np.exp(rng.uniform(*np.log([10, 40])))
     along, centre = [np.cos(leans), np.sin(leans), 0], [-arm * np.sin(leans), arm * np.cos(leans), 0]

@@ -54,7 +54,7 @@ MAKING = (*map(Path, _OF_BARS), *map(Path(__file__).with_name, ("muscle_bars.py"
 # The coarse run of a scene with refined tetrahedra omits the last refinement; that of any other scene has its own mesh, with
 # tetrahedra larger by the first of these factors with which it can be set up.
 RATIOS = (1.5, 1.25)
-_AT_ONCE = 2  # runs for error bars that are solved at a time, if there are as many cores
+_AT_ONCE = 2  # the number of runs for error bars that are solved at once, if there are enough cores and memory
 # Without a request, error bars are computed only if their estimated time is at most this fraction of the reference's time.
 CHEAP = 0.2
 
@@ -95,7 +95,7 @@ def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBa
 
 
 def made(pair: Pair, bench: Bench[MuscleCase], folder: Path | None, reference: Run) -> ErrorBars:
-    """The error bars of a ``pair`` of runs of the muscle of a bench; stored in a ``folder``, if given, for ``reference``."""
+    """The error bars from a ``pair`` of runs of the muscle of a bench. They are stored in ``folder``, if it is given."""
     log.info("error bar: comparing the runs")
     context = context_of(bench.setup(), pair.fine)
     bars = error_bars.error_bars(pair, context)
@@ -126,7 +126,7 @@ def offered(bench: Bench[Case], reference: Run, *, asked: bool) -> ErrorBars | N
 
 
 def stored(reference: Run, muscle: str = "") -> ErrorBars | None:
-    """The error bars stored with a reference run, of one ``muscle`` of several; None if there are none by the current metrics."""
+    """The error bars stored with a reference run, for one ``muscle`` if it has several; None if the current metrics made none."""
     if reference.folder is None:
         return None
     folder = reference.folder / muscle
@@ -145,7 +145,7 @@ def needed[C: DrivenCase](bench: Bench[C], reference: Run) -> dict[str, Vary[C]]
 
 
 def finer[C: DrivenCase](bench: Bench[C], reference: Run, ratio: float) -> C:
-    """The scene of a bench on tetrahedra of ``ratio`` times the size, with every other source of error in its bars halved."""
+    """The scene of a bench on tetrahedra of ``ratio`` times the size, with every other source of numerical error halved."""
     scene = on_larger(bench.scene, ratio)
     for vary in needed(bench, reference).values():
         scene = vary(scene)
@@ -206,8 +206,8 @@ def solutions[C: DrivenCase](
 
 
 def _at_once[C: DrivenCase](bench: Bench[C], reference: Run) -> tuple[int | None, int]:
-    """The ranks of each run for error bars, and the number of runs at a time for which there are cores and memory: none needs more
-    than the ``reference``.
+    """The ranks of each run for error bars, and the number of runs at a time for which there are cores and memory; no run
+    needs more memory than the ``reference``.
     """
     asked = getattr(bench.settings(bench.scene.reference, "reference"), "ranks", None)
     cores = len(os.sched_getaffinity(0)) // (asked or 1)
@@ -225,8 +225,8 @@ def check_coarser(bench: Bench[MuscleCase], fine: float, coarse: float) -> None:
 
 def safety(bench: Bench[MuscleCase]) -> float:
     """The factor of safety: that of a grid convergence index, times the ratio of the size of the unrefined tetrahedra to the radius
-    of the smallest attachment, if this ratio is above 1. Nested tetrahedra share the polygonal outline of an attachment, so their
-    difference does not show its error.
+    of the smallest attachment, if this ratio is above 1. Nested meshes share the polygonal outline of an attachment, so the
+    difference of their results does not show the error of this outline.
     """
     surface, attached = bench.setup().surface, bench.setup().attached
     areas = [attached_area(surface, attached_shares(surface, entry.vertices)) for entry in attached]
@@ -236,7 +236,7 @@ def safety(bench: Bench[MuscleCase]) -> float:
 
 def coarser[C: DrivenCase](bench: Bench[C]) -> tuple[Bench[C], float]:
     """A bench of the case with larger tetrahedra in every muscle, and the ratio of the sizes: the same for all, as errors of one
-    muscle reach its neighbours. If all are refined, the last refinement is left out. Raises InputError if no case can be set up.
+    muscle reach its neighbours. If all meshes are refined, omit the last refinement. Raises InputError if no case can be set up.
     """
     case, failed = bench.scene, list[InputError]()
     if all(one.refinements for one in muscles_of(case)):
@@ -280,7 +280,7 @@ def _solved[C: DrivenCase](other: Bench[C], name: str, reference: Run) -> tuple[
 
 
 def _of(reference: Run) -> dict[str, str]:
-    """The identity of error bars: this run, measured by these metrics."""
+    """The identity of error bars: the run, and the metrics by which it was measured."""
     assert reference.folder is not None  # the caller has checked this
     return {"run": reference.folder.name, "metrics": _measuring_hash()}
 

@@ -195,7 +195,7 @@ class _Measured:
         return made(one.candidate.name, one.candidate, one.candidate.name)
 
     def row(self, one: Entrant, run: Run, key: str) -> Standing:
-        """The row of a run with this ``key``. A run that took more than the time limit counts as timed out, even if it was solved
+        """The row of a run with this ``key``. A run that took longer than the time limit counts as timed out, even if it was solved
         with another limit.
         """
         own = run is self.reference

@@ -72,7 +72,7 @@ def _trial(varied: Unknowns, parameters: Sequence[Parameter], point: Floats) -> 
 
 
 def _nominal(case: MuscleCase, reference: Run, store: Path, workers: Workers) -> tuple[Comparison, dict[str, str]]:
-    """The comparison of the case itself, with error bars, and the reasons by name why candidates did not reach all frames."""
+    """The comparison of the case itself, with error bars, and, by name, the reasons why candidates did not reach all frames."""
     bench = shared_bench(case, store)
     bars = refinement.bars(bench, reference, model=False)
     made = carry_out([Trial(case, one, one.name) for one in case.candidate], store, workers)
@@ -84,7 +84,7 @@ def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iter
     """The band of each quantity that the case has, from those ``runs`` of the ``design`` that reached all frames."""
     whole = [complete(run, comparison.reference.numbers) for run in runs]
     context = comparison.context
-    assert isinstance(context, MeasurementContext)  # the case is of a muscle
+    assert isinstance(context, MeasurementContext)  # the case is that of a muscle
     yield _surface(comparison, context, design, whole)
     measured = [change(run, context, {name.split(".")[0] for name in QUANTITIES}) for run in whole]
     for name in QUANTITIES:
@@ -105,7 +105,7 @@ def of_runs(comparison: Comparison, design: Design, runs: Sequence[Run]) -> Iter
 
 
 def _rows(found: Sequence[Floats], like: Floats) -> Floats:
-    """The values ``found`` of n runs as an array (n, f), also for n = 0; ``like`` (f,) has a value for each frame."""
+    """The values ``found`` of n runs as an array (n, f), even for n = 0; ``like`` (f,) has a value for each frame."""
     return np.array(found).reshape(len(found), len(like))
 
 

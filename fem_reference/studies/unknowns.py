@@ -22,7 +22,7 @@ class Unknowns:
 
     @property
     def case(self) -> MuscleCase:
-        """The case with the acting effects as a list."""
+        """The case with the acting effects alone, as if its file listed only these."""
         return self.at({})
 
     def at(self, values: dict[str, float]) -> MuscleCase:

@@ -63,7 +63,7 @@ def by_springs(case: MuscleCase) -> bool:
 
 def with_distances[C: DrivenCase](case: C, factor: float, *keys: str) -> C:
     """The case with ``keys`` of its bones, which control the accuracy of distances, multiplied by ``factor``. Only bones with a
-    surface are changed, as distances to closed forms are exact.
+    surface are changed, as distances to analytic shapes are exact.
     """
     bones = (
         bone.model_copy(update={key: factor * getattr(bone, key) for key in keys}) if bone.surface else bone
@@ -74,7 +74,7 @@ def with_distances[C: DrivenCase](case: C, factor: float, *keys: str) -> C:
 
 def with_half_steps[C: DrivenCase](case: C, settings: Record) -> Vary[C]:
     """A function that changes a case to load steps of at most half the length. As a step ends at each frame, ``frames.every`` also
-    limits the length of the steps of ``case``, which have the ``settings`` of its reference.
+    limits the length of the steps of ``case``. ``settings``: those of its reference.
     """
     own = settings.model_dump()
     largest = min(case.frames.every, own["largest_step"] or math.inf) / 2
@@ -83,14 +83,14 @@ def with_half_steps[C: DrivenCase](case: C, settings: Record) -> Vary[C]:
 
 
 def without_states(choice: SolverChoice) -> SolverChoice:
-    """The ``choice`` without stored states of the reference, for a run that is only measured."""
+    """The ``choice`` for a run that is only measured, in which the reference does not store its states."""
     return choice.model_copy(update={"store_state": False}) if choice.solver == "fenicsx" else choice
 
 
 def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
     """The case on a surface with ``4**power`` times as many triangles.
 
-    The files of the new surface are written into a folder below ``folder`` that is named after their contents. A vertex is attached
+    The files of the new surface are written into a folder in ``folder`` that is named after their contents. A vertex is attached
     if the nearest vertex of the original surface is attached.
     """
     surface = resampled(setup.surface, power)

@@ -75,7 +75,7 @@ def _bench(case: Case, muscle: str, folder: Path) -> Bench[Any]:
 def _chosen(
     case: Case, solver: str | Callable[..., None] | None, settings: dict[str, Any], folder: Path
 ) -> tuple[str, SolverChoice]:
-    """The name of a run, and its solver with settings. A function is saved below the ``folder`` of runs."""
+    """The name of a run, and its solver with settings. A function is saved inside the ``folder`` of runs."""
     if callable(solver):
         return solver.__name__, command.of_function(solver, settings, folder / "functions")
     if solver is None:
@@ -116,7 +116,7 @@ def error_bars(
     store: str | Path = STORE,
     progress: Progress | None = None,
 ) -> ErrorBars | BodyBars | None:
-    """Estimate the error of each statistic of a reference from runs on larger tetrahedra and with finer contact. The error of a
+    """Estimate the error of each statistic of a reference from runs on larger tetrahedra and with stiffer contact. The error of a
     body is estimated from one solution on smaller cells or with more unknowns in each cell.
 
     ``reference``: the run that :func:`solve` returned without a ``solver``, next to which the error bars are stored; or the run

@@ -27,9 +27,9 @@ from fem_reference.studies.hard.records import FACES, FIRST, Face, Hard, Hold, L
 # The default material of blocks: the usual matrix material of muscle.
 MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible", bulk="10 MPa"))
 _LINES, _POINTS = 4, 9  # the number of measured lines in each block, and of points on each line
-# The bones of held faces are spheres far from the block; their radius and distance are relative to the size of the block.
+# The bones of attached faces are spheres far from the block; their radius and distance are relative to the size of the block.
 _BALL, _AWAY = 0.01, 50.0
-_SAME = 1e-9  # the maximum rounding difference between equal motions of two holds, relative to the block's size
+_SAME = 1e-9  # the maximum rounding difference between equal motions of two attachments, relative to the block's size
 
 
 def problem(hard: Hard) -> MuscleProblem:
@@ -61,8 +61,8 @@ def problem(hard: Hard) -> MuscleProblem:
 
 
 def several(hard: Hard) -> MusclesProblem:
-    """The problem of the block of ``hard`` and its further bodies. Contact acts between any two if ``hard`` has the effect
-    "touching".
+    """The problem of the block and the further bodies of ``hard``. Contact acts between any two of them if ``hard`` has the
+    effect "touching".
     """
     law, apart = touching_among(hard.effect), dict[str, MuscleProblem]()
     parts = {FIRST: hard}
@@ -80,7 +80,7 @@ def several(hard: Hard) -> MusclesProblem:
 
 
 def _named(name: str, one: MuscleProblem) -> MuscleProblem:
-    """The problem ``one``, with ``name`` as a prefix to the names of the bones of its holds."""
+    """The problem ``one``, with ``name`` as a prefix to the names of the bones of its attachments."""
     held = (replace(entry, bone=replace(entry.bone, name=f"{name}: {entry.bone.name}")) for entry in one.attached)
     return replace(one, attached=tuple(held))
 
@@ -96,7 +96,7 @@ class Moved:
     cell: float
 
     def __call__(self, points: Floats) -> Floats:
-        """Positions (n, 3) [mm] of rest points (n, 3). The random displacement of a point does not depend on the other points."""
+        """The positions (n, 3) [mm] of ``points`` at rest. The random displacement of a point does not depend on the others."""
         match self.start.kind:
             case "point":
                 return np.broadcast_to(self.middle, points.shape).copy()
@@ -164,7 +164,7 @@ def _held(block: Lattice, hold: Hold, nodes: Ints, surface: Surface) -> Attached
 
 
 def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> None:
-    """Raise InputError if two holds move shared vertices to different positions: most solvers would obey only one of the holds."""
+    """Raise InputError if two attachments move shared vertices to different positions: most solvers would obey only one of them."""
     assert hard.frames is not None  # a block has frames
     keyframes = (key.frame for hold in hard.hold if hold.motion for key in hold.motion.keyframes)
     frames = sorted({*hard.frames.numbers, *keyframes})

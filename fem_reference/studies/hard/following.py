@@ -23,8 +23,8 @@ from fem_reference.solvers import fenicsx
 from fem_reference.solvers.common.protocol import MuscleSolver
 from fem_reference.studies.hard.records import REFERENCE, SECOND, Hard, Lattice, StepCounts, task_of
 
-_MOST_FOR_SECOND = 200  # the maximum number of tetrahedra for scikit-fem, which solves these within seconds
-SAME = 0.01  # [%] of the body's size: the maximum distance between two states that count as the same
+_MOST_FOR_SECOND = 200  # the maximum number of tetrahedra for scikit-fem, which solves that many within seconds
+SAME = 0.01  # the maximum distance, in % of the body's size, between two states that count as the same
 _CUTS = 64  # the maximum factor by which a load step is reduced before the run ends as failed
 MOVED = 0.1  # the maximum random displacement of the points of a block, in cell sizes
 SIZES = 0.03  # the maximum relative change of the tetrahedron size of a shipped case
@@ -124,8 +124,8 @@ def farthest(followed: Followed) -> StepCounts | None:
 
 
 def in_steps(built: MechanicalProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
-    """Solve the reference up to a frame with several numbers of equal load steps. Compare the end states with that of the largest
-    number of steps with which the frame was reached.
+    """Solve the reference up to a frame with several numbers of equal load steps. Compare the end states with that after the
+    largest number of steps with which the frame was reached.
     """
     ends, words, span = dict[int, Floats](), list[str](), steps.until - built.frames[0]
     for count in steps.counts:

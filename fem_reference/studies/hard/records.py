@@ -1,4 +1,4 @@
-"""Records of hard cases, read from files below ``cases/hard``, with their variants."""
+"""Records of hard cases, read from files inside ``cases/hard``, with their variants."""
 
 import math
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ from fem_reference.scenes.muscle import CaseBone, Frames, Motion
 FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
 FACES: tuple[Face, ...] = get_args(Face)
-_MOST_CELLS = 50_000  # the maximum number of cells of a block; no solver solves as many within its time limit
+_MOST_CELLS = 50_000  # the maximum number of cells of a block; no solver solves that many within its time limit
 FIRST = "block"  # the name of the first of several bodies
 REFERENCE, SECOND = "fenicsx", "scikit_fem"
 LIMIT = 120.0  # the limit of processor time of a run [s]
@@ -39,10 +39,10 @@ class Lattice(Record):
     """A block of the given ``size``, whose lower corner is ``corner``. It has a number of ``cells`` along each axis, and each cell
     is cut into six tetrahedra.
 
-    ``grading``: the ratio of the length of the last cell to that of the first, along each axis. ``jitter``: the maximum random
+    ``grading``: for each axis, the ratio of the length of the last cell to that of the first. ``jitter``: the maximum random
     displacement of nodes, in cell sizes; nodes on faces and edges stay on them. ``seed``: the seed of the random displacements.
     ``rounding``: 0 for a block; values close to 1 turn it into an ellipsoid. ``fibre``: the direction of fibres; measured lines
-    follow the nearest axis. ``points_apart`` [mm]: the spacing of points for contact and springs, by default as on muscles.
+    follow the axis nearest to it. ``points_apart`` [mm]: the spacing of points for contact and springs, by default as on muscles.
     """
 
     size: Point
@@ -88,7 +88,7 @@ class Start(Record):
     """A state at the first frame that replaces the rest state.
 
     ``random``: points are displaced at random by up to ``amount`` cell sizes. ``point``: the body is collapsed to its centre.
-    ``plane``: the body is collapsed onto the plane through its centre normal to z. ``inside out``: the body is reflected in this
+    ``plane``: the body is collapsed onto the plane normal to z through its centre. ``inside out``: the body is reflected in this
     plane.
     """
 
@@ -125,7 +125,7 @@ class Hard(Record):
     solvers that the case is about, by default all; ``because``: the reason. ``no_solution``: the reason why no equilibrium exists;
     a run should then end with a status other than ``converged``. ``contrast``: the defect that the case demonstrates; a run should
     then violate a bound. ``by_effects``: the case depends on its effects and does not apply to solvers that simulate none.
-    ``settings``: by solver, changes to its usual settings (mostly those of the report's Table 5.1). ``steps``: see ``StepCounts``.
+    ``settings``: for each solver, changes to its usual settings (mostly those of Table 5.1). ``steps``: see ``StepCounts``.
     """
 
     title: str

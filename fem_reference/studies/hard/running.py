@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 _AGAIN = 1.0
 # The limit of processor time [s] if a case is repeated with several numbers of load steps or on several meshes.
 LONGER = 600.0
-# The pattern of a rest position [mm] in messages.
+# The pattern of a position at rest [mm] in messages.
 _PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
 
 
