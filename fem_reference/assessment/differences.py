@@ -1,4 +1,4 @@
-"""Sizes of differences between two runs; if one is small by chance, an average over frames or statistics is used instead."""
+"""Sizes of differences between two runs; for a difference that is small by chance, averages over frames or statistics are used."""
 
 import math
 
@@ -10,9 +10,7 @@ from fem_reference.runs.store import Run
 
 # Prefixes of statistics that are the value at a single point, each with the prefix of the corresponding average over points.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
-_LEAST = (
-    0.5  # averages of changes differ by at least this fraction of the distance between the runs; less is due to chance
-)
+_LEAST = 0.5  # runs are taken to differ in the change of an average by at least this fraction of their distance; less is due to chance
 _MOVED = 0.01  # if a surface has moved by less than this fraction of its maximum motion, ratios to the motion have no meaning
 
 
@@ -33,7 +31,7 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
     """The typical size (f,) of the signed ``differences`` (f,) of a statistic between two runs.
 
     ``apart`` (f,) [mm]: the distance between the surfaces of the runs. The size is at least this distance times the average ratio
-    of difference to distance over the frames: a difference that crosses zero does not show that the error is small in that frame.
+    of difference to distance over the frames: a difference that crosses zero in a frame does not prove a small error there.
     If the surfaces are equal, the size is the magnitude of the difference.
 
     ``moved`` (f,) [mm]: the motion of the surfaces. If it is given, the distance is taken to be at least the motion times the
@@ -47,8 +45,8 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
 
 
 def together(parts: dict[str, Floats], there: NDArray[np.bool_]) -> tuple[Floats, dict[str, float]]:
-    """The error bar (f,) of independent sources of error, which is the root sum of squares of their ``parts`` (f,), and the maximum
-    of each part over the frames in which ``there`` (f,) is True, or over all frames if it is never True.
+    """The error bar (f,) of independent sources of error (the root sum of squares of their ``parts`` (f,)); and the maximum of each
+    part over the frames in which ``there`` (f,) is True, or over all frames if it is never True.
     """
     greatest = {name: float((part[there] if there.any() else part).max()) for name, part in parts.items()}
     return np.sqrt(np.sum([part**2 for part in parts.values()], axis=0)), greatest

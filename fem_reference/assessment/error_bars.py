@@ -138,8 +138,8 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
         return change(run, context, comparing) if other is None else measure(run, other, context, comparing)
 
     def differences(run: Run, other: Run) -> _Differences:
-        """The differences of two runs: of their changes from rest, each with the fibres in its interior, and the deviations of the
-        surface of ``other`` from the surface of ``run``.
+        """The differences between the changes of two runs from rest, each computed with the fibres in the interior of that run, and
+        the deviations of the surface of ``other`` from the surface of ``run``.
         """
         against_run, against_itself = (measured(surface(other), surface(one)) for one in (run, other))
         changes = _less(measured(run, None), measured(other, None))

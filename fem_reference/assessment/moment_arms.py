@@ -33,7 +33,7 @@ class ArmRange:
 
 
 def poses(angles: Floats) -> Floats:
-    """Even angles (a,) [deg], in steps of 2 degrees, over the range of the ``angles`` (f,) [deg] of the frames."""
+    """The multiples (a,) [deg] of 2 degrees within the range of the ``angles`` (f,) [deg] of the frames."""
     first, last = np.ceil(angles.min() / STEP - 1e-9), np.floor(angles.max() / STEP + 1e-9)
     return np.asarray(STEP * np.arange(first, last + 1) + 0.0)  # no -0
 

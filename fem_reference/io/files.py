@@ -23,7 +23,7 @@ from fem_reference.io.formats import Format, formats, vtk
 from fem_reference.io.formats.msh import read_mesh
 from fem_reference.io.texts import beside, check_size, is_file, parsed_xml
 
-# The maximum size in bytes of a mesh, a table or an index: a million triangles, which is more than our meshers and solvers can use.
+# The maximum size in bytes of a mesh, table or index file. A million triangles fit, more than our meshers and solvers can use.
 # The values of a text file need up to thirty times as much memory as the file.
 MOST_BYTES = 2**26
 # A half-written file that is older than this [s] is removed unless its process is still running on this machine. A newer file may

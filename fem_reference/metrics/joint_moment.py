@@ -5,8 +5,8 @@ fixed in space. By virtual work, without dissipation, the moment is minus the de
 angle. Lines of action pull at their ends, at via-points and at obstacles. The force is unknown for lines without the Hill model
 (``hill``) and for most fast solvers.
 
-This moment arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with
-little force (docs/measures.md).
+This moment arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent muscle matrix carries a
+moment with little force (docs/measures.md).
 """
 
 from functools import partial

@@ -33,7 +33,7 @@ _SAME = 1e-9
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Statistics over the fibres of ``r - r_reference`` [mm]: ``mean``, ``rms``, minimum (``least``), maximum (``greatest``) and
+    """Statistics, over the fibres, of ``r - r_reference`` [mm]: ``mean``, ``rms``, minimum (``least``), maximum (``greatest``) and
     maximum magnitude (``max``).
     """
     if not context.joints or len(run.numbers) < 2:
@@ -72,7 +72,7 @@ def turning(joints: Sequence[Joint], context: MeasurementContext, numbers: Seque
 
 
 def _near(angles: Floats, frame: int) -> list[int]:
-    """The ``frame`` and up to two frames nearest in time with other angles, among which the joint does not reverse."""
+    """The ``frame`` and up to two frames nearest in time with other angles, between which the joint does not reverse."""
     before = list(_onward(angles, range(frame - 1, -1, -1), frame))
     after = list(_onward(angles, range(frame + 1, len(angles)), frame))
     if before and after and (angles[frame] - angles[before[0]]) * (angles[after[0]] - angles[frame]) > 0:
