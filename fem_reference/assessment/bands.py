@@ -33,7 +33,7 @@ class Design:
 
     @property
     def refused(self) -> str:
-        """The reason why there are too few runs for a band; empty if there are enough."""
+        """The reason to refuse a band, if too few runs have results; empty if there are enough."""
         made, variables = len(self.points), self.points.shape[1]
         if made < 2 * (variables + 1):
             return f"{made} runs have results, but {variables} parameters need at least {2 * (variables + 1)}"

@@ -199,8 +199,8 @@ def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measur
 
 
 def _ended(residuals: _Residuals, parameters: Sequence[Parameter]) -> tuple[Calibration, Floats]:
-    """The best point of a fit that could not continue, without intervals, and the residuals at this point, NaN if no point has a
-    result.
+    """The calibration at the best point of a fit that could not continue, without intervals; and the residuals at this point, NaN
+    if no point has a result.
     """
     best, freedom = residuals.best(), len(residuals.values) - len(parameters)
     left = np.full(len(residuals.values), np.nan) if best is None else best[1]

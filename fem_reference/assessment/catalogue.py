@@ -152,8 +152,8 @@ class Result:
 
     @property
     def word(self) -> str:
-        """The verdict: pass, fail or inconclusive. For an experiment it is "within" or "outside" its uncertainty, or fail if the
-        value has changed.
+        """The verdict: pass, fail or inconclusive. For an experiment it is "within" or "outside" the uncertainty of the
+        experiment, or fail if the value has changed.
         """
         judged, pinned = judge(self.finding.value, self.truth, self.within), self.entry.pinned
         if pinned is None:

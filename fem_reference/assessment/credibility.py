@@ -171,8 +171,8 @@ def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result]
 
 
 def of_result(found: Result) -> Beside:
-    """The comparison that a result of a catalogue entry of the kind "experiment" makes. It validates only if all facts of the entry
-    validate and no part of its model is recalled.
+    """The comparison stated by the result of a catalogue entry of the kind "experiment". It validates only if all facts of the
+    entry validate and no part of its model is recalled.
     """
     entry = found.entry
     facts = entry.facts

@@ -10,7 +10,7 @@ from fem_reference.runs.store import Run
 
 # Prefixes of statistics that are the value at a single point, each with the prefix of the corresponding average over points.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
-_LEAST = 0.5  # runs are taken to differ in the change of an average by at least this fraction of their distance; less is due to chance
+_LEAST = 0.5  # the changes of an average are taken to differ by at least this fraction of the deviation; less is due to chance
 _MOVED = 0.01  # if a surface has moved by less than this fraction of its maximum motion, ratios to the motion have no meaning
 
 
@@ -60,11 +60,11 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
     the deviation times the average ratio of difference to deviation, over the frames and over the statistics of the metric. For
     averages over points it is at least half the deviation.
 
-    By the triangle inequality, changes of the same points differ by at most their deviation. They differ by less, because most of
-    the deviation is not along the displacement, or cancels. A single statistic does not show by how much less: its difference may
-    be small by chance, especially at the worst point. A quantile or a maximum belongs to a single point, whichever that is: nothing
-    cancels there, and no quantile of the deviation bounds the difference. So this difference is taken to be at least the rms
-    distance over the points.
+    By the triangle inequality, the changes of a point in two runs differ by at most its deviation. They differ by less, because
+    most of the deviation is not along the displacement, or cancels. A single statistic does not show by how much less: its
+    difference may be small by chance, especially at the worst point. A quantile or a maximum belongs to a single point, whichever
+    that is: nothing cancels there, and no quantile of the deviation bounds the difference. So this difference is taken to be at
+    least the rms distance over the points.
     """
     metrics = [metric for metric, _ in names]
     shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]
@@ -88,8 +88,8 @@ def carried(run: Run, moved: Floats) -> dict[str, Floats]:
     """Errors (f,) of the volume enclosed by the surface of a ``run``, by statistic; empty for a run without tetrahedra.
 
     The surface is embedded in tetrahedra and lies partly outside them, so the error is the difference between the relative changes
-    of the two volumes. This difference may cross zero, so the error is at least the motion ``moved`` (f,) [mm] of the surface times
-    the average ratio of error to motion.
+    of the enclosed volume and of the volume of the tetrahedra. This difference may cross zero, so the error is at least the motion
+    ``moved`` (f,) [mm] of the surface times the average ratio of error to motion.
     """
     inside = run.scalars.get("volume_ratio")
     if inside is None:

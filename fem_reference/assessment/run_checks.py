@@ -162,9 +162,9 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
 
 
 def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
-    """The distance of exactly attached vertices from their positions on the bone: a strain times their distance from attached
-    facets is allowed. For springs, the mean extension: the force (with ``in_situ``, plus that at rest) divided by stiffness
-    and area is allowed.
+    """The distance of exactly attached vertices from their positions on the bone; the limit is a strain times their distance from
+    the attached facets. For springs, the mean extension; the limit follows from the force (with ``in_situ``, plus the force at
+    rest), divided by stiffness and area.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets = Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])

@@ -110,8 +110,8 @@ class Standings(Record):
 
 @dataclass(frozen=True)
 class OverCases:
-    """A solver over ``count`` cases. ``share``: the median of its error, in per cent of the maximum displacement; NaN for the
-    reference. ``seconds``: the median of its time [s]. ``lost``: the cases on which it failed.
+    """A summary of a solver over ``count`` cases. ``share``: the median of its error, in per cent of the maximum displacement; NaN
+    for the reference. ``seconds``: the median of its time [s]. ``lost``: the cases on which it failed.
     """
 
     group: str

@@ -34,7 +34,7 @@ Shown = Literal["main", "table", "headline", "curve", "angle", "solvers", "scene
 class Statistic:
     """The description of a statistic, stated by its metric.
 
-    ``title`` and ``part``: headings of the group of columns and of the column. ``headline``: a sentence with ``{}`` for the value.
+    ``title`` and ``part``: headings of the group of columns and of the column. ``headline``: a phrase with ``{}`` for the value.
     ``curve``: the title of the plot of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: by place, the rank
     of the statistic in the order there, the lowest first. ``local``: True if its error converges like that of the worst point.
     ``lone``: True for the value of a single fibre or of the force on a bone, which is not a mean. ``pooled``: True if the

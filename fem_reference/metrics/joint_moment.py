@@ -60,7 +60,7 @@ def _has_force(run: Run, joint: Joint) -> bool:
 
 
 def _values(run: Run, joint: Joint) -> Floats:
-    """The moment, the force and the moment arm in each frame (3, f).
+    """The moment, the force and the moment arm (3, f) in each frame.
 
     For a muscle that is a line between two bones, or around obstacles on these bones, the arm is ``-dl/dtheta``. For any other
     muscle it is, by virtual work, the mean of ``-dl/dtheta`` over all parts that pull, weighted by their shares of the resultant.
