@@ -44,7 +44,7 @@ class Design:
 
 
 def sampled(variables: int, runs: int, seed: int) -> Floats:
-    """Points (runs, variables) of a Latin hypercube from -1 to 1: each variable has one value in each of ``runs`` intervals."""
+    """Points (runs, variables) of a Latin hypercube from -1 to 1: each variable has one value in each of ``runs`` equal bins."""
     from scipy.stats import qmc  # imported here, as this takes half a second
 
     return np.asarray(2 * qmc.LatinHypercube(variables, rng=np.random.default_rng(seed)).random(runs) - 1)

@@ -28,7 +28,7 @@ from fem_reference.runs.store import Run
 ROUNDING = 1e-9
 # The error of exactly attached vertices may be this strain (a stretch of 4) times their distance from the attached facets.
 _STRAIN = 3.0
-# Safety factor on the mean extension of springs that follows from the recorded force, as springs do not pull at vertices.
+# Safety factor on the mean extension of springs from the recorded force: the extension is computed at vertices, not at springs.
 _SPRINGS = 1.5
 # The maximum rotation of a bone per load step, on average between two frames; beyond it the sense of rotation is unknown.
 _TURN = 1.01 * math.pi / 2
