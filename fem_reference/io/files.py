@@ -227,7 +227,7 @@ def _unwritten(path: Path, error: OSError) -> OSError:
 
 
 def clear(path: Path) -> None:
-    """Remove half-written copies of ``path``, a file or a folder, that killed processes have left behind."""
+    """Remove half-written copies of the file or folder ``path`` that killed processes have left behind."""
     for part in path.parent.glob(f".{glob.escape(path.stem)}-*{glob.escape(path.suffix)}"):
         process = part.name.removeprefix(f".{path.stem}-").removesuffix(path.suffix)
         with suppress(OSError):

@@ -1,9 +1,9 @@
 """Moment arms of the fibres about the rotating joint, by the tendon excursion method: ``-dl/dtheta`` (An et al. 1984).
 
 ``l`` [mm] is the length of a fibre and ``theta`` [rad] the angle of the joint. The moment arm is positive if the muscle shortens as
-the angle increases, as in OpenSim. The slope is that of the parabola through the lengths in the frame and in the
-two frames nearest in time that have other angles; its error is of second order in the differences between these angles. If more
-than one bone moves, lengths do not depend on a single angle, and the moment arm is NaN. A case without a joint has no moment arms.
+the angle increases, as in OpenSim. The slope is that of the parabola through the lengths in the frame and in the two
+frames nearest in time that have other angles; its error is of second order in the differences between these angles. If more than
+one bone moves, lengths do not depend on a single angle, and the moment arm is NaN. A case without a joint has no moment arms.
 """
 
 from collections.abc import Iterator, Sequence
