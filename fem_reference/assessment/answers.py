@@ -1,4 +1,4 @@
-"""The settings that studies recommend for usual requests: within an error limit, at a frame rate, or at the knee of the front."""
+"""The settings that studies recommend for usual requests: an error limit, a frame rate, or the knee of error against time."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence

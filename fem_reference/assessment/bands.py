@@ -1,4 +1,4 @@
-"""Bands of results in each frame, from runs with varied parameters: from a surrogate if it is accurate, otherwise from the runs."""
+"""Bands of results in each frame for varied parameters: from a surrogate of the runs if it is accurate, otherwise from the runs."""
 
 import math
 from dataclasses import dataclass, replace
@@ -23,8 +23,8 @@ _SHARE = 1e-6  # the maximum fraction of a field's variance in the principal com
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A design: the ``parameters``, the number of requested runs (``wanted``), and the ``points`` (n, d) of the runs that have
-    results, with coordinates from -1 to 1.
+    """A design of experiments: the ``parameters``, the number of requested runs (``wanted``), and the ``points`` (n, d) of the runs
+    that have results, with coordinates from -1 to 1.
     """
 
     parameters: tuple[Parameter, ...]
@@ -33,7 +33,7 @@ class Design:
 
     @property
     def refused(self) -> str:
-        """The reason why there are too few runs for a band; empty if there are enough."""
+        """The reason to refuse a band, if too few runs have results; empty if there are enough."""
         made, variables = len(self.points), self.points.shape[1]
         if made < 2 * (variables + 1):
             return f"{made} runs have results, but {variables} parameters need at least {2 * (variables + 1)}"
@@ -44,7 +44,7 @@ class Design:
 
 
 def sampled(variables: int, runs: int, seed: int) -> Floats:
-    """Points (runs, variables) from -1 to 1 of a Latin hypercube: each variable has one value in each of ``runs`` equal parts."""
+    """Points (runs, variables) of a Latin hypercube from -1 to 1: each variable has one value in each of ``runs`` equal bins."""
     from scipy.stats import qmc  # imported here, as this takes half a second
 
     return np.asarray(2 * qmc.LatinHypercube(variables, rng=np.random.default_rng(seed)).random(runs) - 1)
@@ -115,7 +115,7 @@ def _filled(band: Band, defined: Floats, found: Floats) -> Band:
 
 
 def _samples(design: Design) -> Floats:
-    """Points (s, d) from -1 to 1 at which a surrogate is evaluated."""
+    """Points (s, d), with coordinates from -1 to 1, at which a surrogate is evaluated."""
     from scipy.stats import qmc
 
     return np.asarray(2 * qmc.Sobol(len(design.parameters), rng=np.random.default_rng(0)).random_base2(_SAMPLES) - 1)

@@ -32,7 +32,7 @@ _WANT = f"a CSV file whose first row is {','.join(COLUMNS)}"
 Forward = Callable[[Sequence[Floats]], Sequence[Floats | None]]
 # The maximum number of evaluations per parameter, not counting finite differences.
 _MOST = 50
-# The law fits the data if the root mean square residual is at most this many standard deviations of the data.
+# The model fits the data if the root mean square residual is at most this many standard deviations of the data.
 FOLLOWED = 2.0
 _ENDED = "a run that the fit needs has no result"
 
@@ -73,9 +73,9 @@ class Estimate:
 class Calibration:
     """The result of a fit: the ``estimates`` of the parameters of a case, the measurements (``rows``) and the ``fitted`` values.
 
-    ``scatter``: the root mean square residual per degree of freedom, in standard deviations of the data; it is near 1 if law and
-    data agree. ``singular``: the singular values of the matrix of sensitivities, in standard deviations per range. ``pairs``: the
-    titles of two parameters whose errors are correlated, and the correlation. ``runs``: the number of requested runs.
+    ``scatter``: the root mean square residual per degree of freedom, in standard deviations of the data; it is near 1 if model
+    and data agree. ``singular``: the singular values of the matrix of sensitivities, in standard deviations per range. ``pairs``:
+    for each pair of parameters with correlated errors, both titles and the correlation. ``runs``: the number of requested runs.
     ``converged``: True if no further step reduces the residuals. ``failures``: the failed runs. ``ended``: the reason why the fit
     could not continue and has no intervals; otherwise empty.
     """
@@ -99,7 +99,7 @@ class Calibration:
 
     @property
     def holds(self) -> bool:
-        """True if the fit has converged, the law fits the data, and each estimate is determined and lies inside its range."""
+        """True if the fit has converged, the model fits the data, and each estimate is determined and lies inside its range."""
         return self.converged and self.is_followed and all(one.is_known and not one.at for one in self.estimates)
 
 
@@ -199,8 +199,8 @@ def fit(forward: Forward, parameters: Sequence[Parameter], rows: Sequence[Measur
 
 
 def _ended(residuals: _Residuals, parameters: Sequence[Parameter]) -> tuple[Calibration, Floats]:
-    """The best point of a fit that could not continue, without intervals, and the residuals at this point, NaN if no point has a
-    result.
+    """The calibration at the best point of a fit that could not continue, without intervals; and the residuals at this point, NaN
+    if no point has a result.
     """
     best, freedom = residuals.best(), len(residuals.values) - len(parameters)
     left = np.full(len(residuals.values), np.nan) if best is None else best[1]

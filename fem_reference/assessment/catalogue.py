@@ -81,7 +81,7 @@ class Entry:
     the experiment, and neither is a failure; the entry fails if the value no longer equals ``pinned``. ``facts``: the measured
     numbers from which the truth is computed. ``is_order``: True for a ranking of stiffnesses: the value is 1 if the ranking is
     reproduced and 0 if it is not, and the tolerance is 0.5. ``from_memory``: True if a part of the model or of its source is
-    recalled and was not checked in the publication.
+    recalled and was not checked against the publication.
     """
 
     name: str
@@ -152,8 +152,8 @@ class Result:
 
     @property
     def word(self) -> str:
-        """The verdict: pass, fail or inconclusive; for an experiment within or outside its uncertainty, or fail if the value has
-        changed.
+        """The verdict: pass, fail or inconclusive. For an experiment it is "within" or "outside" the uncertainty of the
+        experiment, or fail if the value has changed.
         """
         judged, pinned = judge(self.finding.value, self.truth, self.within), self.entry.pinned
         if pinned is None:
@@ -193,7 +193,7 @@ class Verification:
 
     @property
     def failed(self) -> tuple[Result, ...]:
-        """The results that do not pass. An experiment passes both within and outside its uncertainty."""
+        """The results that do not pass. The verdicts "within" and "outside" on experiments both count as passes."""
         return tuple(one for one in self.results if one.word not in ("pass", "within", "outside"))
 
     @property

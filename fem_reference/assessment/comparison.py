@@ -46,9 +46,9 @@ class Comparison:
     ``setup``: the ``Setup`` of a muscle, or the ``FieldProblem``. ``deviations``: the measures of each candidate against the
     reference, by the name of the candidate. ``changes``: the measures of each run against the rest state, by the name of the run
     (including ``"reference"``); for a field, which has no rest state, the measures that need no reference. ``extension_error``
-    [mm]: for each frame, the maximum error of the lengths of fibres carried by the reference's surface, None without an
-    extension. ``error_bars``: the error bars of the reference, None if they were not computed. ``ladders``: the convergence of the
-    reference on refined meshes, if it was measured.
+    [mm]: for each frame, the maximum error of the lengths of fibres carried by the reference's surface, None for a field.
+    ``error_bars``: the error bars of the reference, None if they were not computed. ``ladders``: the convergence of the reference
+    on refined meshes, if it was measured.
     """
 
     scene: Case

@@ -108,7 +108,7 @@ def _read(table: Any, place: str) -> CaseStudy:
 
 
 def _check(study: CaseStudy, place: str) -> None:
-    """Raise InputError, with a key below ``place``, if a study lacks a feature, or has an unknown unit or unusable points."""
+    """Raise InputError, with a key inside ``place``, if a study lacks a feature, or has an unknown unit or unusable points."""
     _check_features(study, place)
     known = metrics.units()
     for name, unit in study.units.items():
@@ -123,7 +123,7 @@ def _check(study: CaseStudy, place: str) -> None:
 
 
 def _check_features(study: CaseStudy, place: str) -> None:
-    """Raise InputError, with a key below ``place``, if a study lacks a feature, or a feature has an impossible value."""
+    """Raise InputError, with a key inside ``place``, if a study lacks a feature, or a feature has an impossible value."""
     for name in FEATURES:
         if name not in study.features:
             raise InputError(f"{place}: features.{name}", "nothing", "this number: run the verb study again")

@@ -108,7 +108,7 @@ class Row:
 
     @property
     def measured(self) -> tuple[int, int]:
-        """The number of measurements with which the model agrees to within their uncertainty, and of all measurements."""
+        """The number of measurements with which the model agrees within their uncertainty, and the number of all measurements."""
         return count(self.beside, "measurement")
 
     @property
@@ -171,8 +171,8 @@ def row(claim: Evidence, entries: Iterable[Entry], results: Mapping[str, Result]
 
 
 def of_result(found: Result) -> Beside:
-    """The comparison that a result of a catalogue entry of the kind "experiment" makes. It validates only if all facts of the entry
-    validate and no part of its model is recalled.
+    """The comparison stated by the result of a catalogue entry of the kind "experiment". It validates only if all facts of the
+    entry validate and no part of its model is recalled.
     """
     entry = found.entry
     facts = entry.facts
@@ -200,8 +200,8 @@ def _rests_on(facts: tuple[Fact, ...], *, is_order: bool, from_memory: bool) -> 
 def of_arms(arms: ArmsBeside) -> Beside:
     """The comparison of moment arms with a published curve or range.
 
-    A measured curve should lie within the range of the fibres in all poses. Of the range of another model, the fibres should
-    cover at least the percentage that the moment arms of Modenese and Kohout 2020 cover.
+    A measured curve should lie within the range of the fibres in all poses. The fibres should cover at
+    least the same percentage of the range of another model as the moment arms of Modenese and Kohout 2020 cover.
     """
     others_reach = reached(arms)
     inside = "poses with the measured moment arm inside the fibres' range"
@@ -221,7 +221,7 @@ def of_arms(arms: ArmsBeside) -> Beside:
 
 
 def reached(arms: ArmsBeside) -> float:
-    """The percentage of poses with the curve inside, or of overlap, for the fibres of Modenese and Kohout 2020 on the same body."""
+    """The percentage that corresponds to ``arms.share``, for the fibres of Modenese and Kohout 2020 on the same body."""
     quantity = "share_inside" if arms.is_curve else "overlap"
     return experiments.find("modenese_kohout_2020", quantity, arms.muscle.replace("_", " ")).value
 

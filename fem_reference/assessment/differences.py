@@ -1,4 +1,4 @@
-"""Sizes of differences between two runs; if one is small by chance, an average over frames or statistics is used instead."""
+"""Sizes of differences between two runs; for a difference that is small by chance, averages over frames or statistics are used."""
 
 import math
 
@@ -10,9 +10,7 @@ from fem_reference.runs.store import Run
 
 # Prefixes of statistics that are the value at a single point, each with the prefix of the corresponding average over points.
 _OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
-_LEAST = (
-    0.5  # averages of changes differ by at least this fraction of the distance between the runs; less is due to chance
-)
+_LEAST = 0.5  # the changes of an average are taken to differ by at least this fraction of the deviation; less is due to chance
 _MOVED = 0.01  # if a surface has moved by less than this fraction of its maximum motion, ratios to the motion have no meaning
 
 
@@ -33,7 +31,7 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
     """The typical size (f,) of the signed ``differences`` (f,) of a statistic between two runs.
 
     ``apart`` (f,) [mm]: the distance between the surfaces of the runs. The size is at least this distance times the average ratio
-    of difference to distance over the frames: a difference that crosses zero does not show that the error is small in that frame.
+    of difference to distance over the frames: a difference that crosses zero in a frame does not prove a small error there.
     If the surfaces are equal, the size is the magnitude of the difference.
 
     ``moved`` (f,) [mm]: the motion of the surfaces. If it is given, the distance is taken to be at least the motion times the
@@ -47,8 +45,8 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
 
 
 def together(parts: dict[str, Floats], there: NDArray[np.bool_]) -> tuple[Floats, dict[str, float]]:
-    """The error bar (f,) of independent sources of error, which is the root sum of squares of their ``parts`` (f,), and the maximum
-    of each part over the frames in which ``there`` (f,) is True, or over all frames if it is never True.
+    """The error bar (f,) of independent sources of error (the root sum of squares of their ``parts`` (f,)); and the maximum of each
+    part over the frames in which ``there`` (f,) is True, or over all frames if it is never True.
     """
     greatest = {name: float((part[there] if there.any() else part).max()) for name, part in parts.items()}
     return np.sqrt(np.sum([part**2 for part in parts.values()], axis=0)), greatest
@@ -62,11 +60,11 @@ def typical_changes(changes: list[Floats], deviations: list[Floats], names: list
     the deviation times the average ratio of difference to deviation, over the frames and over the statistics of the metric. For
     averages over points it is at least half the deviation.
 
-    By the triangle inequality, changes of the same points differ by at most their deviation. They differ by less, because most of
-    the deviation is not along the displacement, or cancels. A single statistic does not show by how much less: its difference may
-    be small by chance, especially at the worst point. A quantile or a maximum belongs to a single point, whichever that is: nothing
-    cancels there, and no quantile of the deviation bounds the difference. So this difference is taken to be at least the rms
-    distance over the points.
+    By the triangle inequality, the changes of a point in two runs differ by at most its deviation. They differ by less, because
+    most of the deviation is not along the displacement, or cancels. A single statistic does not show by how much less: its
+    difference may be small by chance, especially at the worst point. A quantile or a maximum belongs to a single point, whichever
+    that is: nothing cancels there, and no quantile of the deviation bounds the difference. So this difference is taken to be at
+    least the rms distance over the points.
     """
     metrics = [metric for metric, _ in names]
     shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]
@@ -90,8 +88,8 @@ def carried(run: Run, moved: Floats) -> dict[str, Floats]:
     """Errors (f,) of the volume enclosed by the surface of a ``run``, by statistic; empty for a run without tetrahedra.
 
     The surface is embedded in tetrahedra and lies partly outside them, so the error is the difference between the relative changes
-    of the two volumes. This difference may cross zero, so the error is at least the motion ``moved`` (f,) [mm] of the surface times
-    the average ratio of error to motion.
+    of the enclosed volume and of the volume of the tetrahedra. This difference may cross zero, so the error is at least the motion
+    ``moved`` (f,) [mm] of the surface times the average ratio of error to motion.
     """
     inside = run.scalars.get("volume_ratio")
     if inside is None:

@@ -37,8 +37,8 @@ LONE_FIBRE = 1.2
 # first order is the lowest order of convergence, with any element, away from the rims of constraints (docs/error_bars.md).
 VARIATION = 2.0
 # The order of convergence of errors with the size of the tetrahedra, in general and at the worst point. At rims of attachments,
-# where displacement grows with the square root of the distance, the order is 1, or 2 with a mesh graded towards them; at all other
-# points it is 2 or more. The general order is in between, as runs with three sizes confirm (docs/error_bars.md).
+# where displacement grows with the square root of the distance from the rim, the order is 1, or 2 with a mesh graded towards rims;
+# at all other points it is 2 or more. The general order is in between, as runs with three sizes confirm (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
 # The relative change of a force or moment if the same springs are distributed over facets instead of points of the surface: 5.3 and
 # 8.8 % of the force on the femur at 1 rad, for gluteus_medius and gluteus_maximus.
@@ -138,8 +138,8 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
         return change(run, context, comparing) if other is None else measure(run, other, context, comparing)
 
     def differences(run: Run, other: Run) -> _Differences:
-        """The differences of two runs: of their changes from rest, each with the fibres in its interior, and the deviations of the
-        surface of ``other`` from the surface of ``run``.
+        """The differences between the changes of two runs from rest, each computed with the fibres in the interior of that run, and
+        the deviations of the surface of ``other`` from the surface of ``run``.
         """
         against_run, against_itself = (measured(surface(other), surface(one)) for one in (run, other))
         changes = _less(measured(run, None), measured(other, None))

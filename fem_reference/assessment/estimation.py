@@ -18,7 +18,7 @@ class CurveError:
 
 @dataclass(frozen=True)
 class HeightError:
-    """The error of a fit by Gaussians to the heights of an attached area above its plane, at every second vertex.
+    """The error of a fit by Gaussians to the heights of every second vertex of an attached area above the plane of this area.
 
     ``centres``: the number of Gaussians. ``choice``: the method by which their positions are chosen. ``rms``: the error [mm] at the
     other vertices. ``condition``: the condition number of the matrix.
@@ -34,7 +34,7 @@ class HeightError:
 
 @dataclass(frozen=True)
 class FitError:
-    """The error of a fit by a number of ``gaussians`` to a muscle's surface with a number of ``vertices``: the rms and the maximum
+    """The error of a fit to a muscle's surface, with the numbers of ``gaussians`` and of ``vertices``: the rms and the maximum
     (``greatest``) distance of the vertices [mm], and the ratio of the fitted volume to the muscle's (``volume``).
     """
 
@@ -72,9 +72,9 @@ class DecompositionError:
 
 @dataclass(frozen=True)
 class RodError:
-    """The error of representing a muscle by ``rods`` of one ``radius`` [mm] along its fibres, which together have the volume of the
-    muscle, as in ``viper`` at rest. ``filled``: the fraction of the muscle that is filled. ``outside``: the fraction of
-    the rods that lies outside the muscle. ``overlap``: the fraction of the rods' total volume that is lost because rods overlap.
+    """The error of representing a muscle by ``rods`` of one ``radius`` [mm] along its fibres. The rods together have the volume of
+    the muscle, as in ``viper`` at rest. ``filled``: the fraction of the muscle that is filled. ``outside``: the fraction of the
+    rods that lies outside the muscle. ``overlap``: the fraction of the rods' total volume that is lost because rods overlap.
     """
 
     case: str

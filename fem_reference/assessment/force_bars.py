@@ -1,7 +1,8 @@
 """Error bars of the force on each bone and of its moment about the origin, as magnitudes of vectors.
 
-The rule is the same as for ``joint_moment``. The difference between two runs is the magnitude of the difference of their vectors,
-so the bar is not too short where a component crosses zero. Two bones between which a muscle is in balance have the same bars.
+They follow the same rule as the bars of ``joint_moment``. The difference between two runs is the magnitude of the difference of
+their vectors, so the bar is not too small where a component crosses zero. Two bones between which a muscle is in balance have
+the same bars.
 """
 
 import numpy as np

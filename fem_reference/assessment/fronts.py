@@ -113,7 +113,7 @@ class Price:
 
     @property
     def is_measured(self) -> bool:
-        """True if the errors of the front span a factor of two, so that :attr:`factor` is not an extrapolation."""
+        """True if the errors of the front span at least a factor of two, so that :attr:`factor` is not an extrapolation."""
         return self.worst >= 2 * self.best
 
 

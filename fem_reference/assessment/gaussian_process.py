@@ -1,4 +1,4 @@
-"""Approximation of a function of a few uniformly distributed variables by a Gaussian process fitted to runs; its sensitivities.
+"""Approximation of a function of a few uniformly distributed variables by a Gaussian process fitted to runs, and its sensitivities.
 
 The process has a linear trend and a squared exponential covariance with a length scale for each variable. The length scales and the
 noise maximise the profile likelihood (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning, sections 2.7 and
@@ -69,8 +69,8 @@ class GaussianProcess:
 
 
 def fit(points: Floats, outputs: Floats) -> GaussianProcess | None:
-    """Fit a process to ``outputs`` (n, q) at ``points`` (n, d) from -1 to 1, and measure its error. Returns None if the outputs do
-    not vary.
+    """Fit a process to ``outputs`` (n, q) at ``points`` (n, d) with coordinates from -1 to 1, and compute its error. Returns None
+    if the outputs do not vary.
 
     >>> points = np.linspace(-1, 1, 12)[:, None]
     >>> float(fit(points, np.sin(3 * points))(np.array([[0.5]]))[0, 0].round(3))

@@ -112,7 +112,7 @@ def doubted(word: Word, doubts: Collection[str]) -> Word:
 
 
 def check(case: Case) -> None:
-    """Raise InputError unless each expectation of the case names an existing measure and frame, in a unit of the measure."""
+    """Raise InputError unless each expectation of a case has an existing measure and frame, and values in a unit of the measure."""
     numbers = case.numbers
     for i, entry in enumerate(case.expect):
         place, expectation = join(case.place, f"expect[{i}]"), resolved(entry)

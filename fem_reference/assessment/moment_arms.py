@@ -33,7 +33,7 @@ class ArmRange:
 
 
 def poses(angles: Floats) -> Floats:
-    """Even angles (a,) [deg], in steps of 2 degrees, over the range of the ``angles`` (f,) [deg] of the frames."""
+    """The angles (a,) [deg] that are multiples of 2 degrees and within the range of the ``angles`` (f,) [deg] of the frames."""
     first, last = np.ceil(angles.min() / STEP - 1e-9), np.floor(angles.max() / STEP + 1e-9)
     return np.asarray(STEP * np.arange(first, last + 1) + 0.0)  # no -0
 
@@ -107,7 +107,9 @@ class ArmsBeside:
 
     @property
     def bias(self) -> float:
-        """The mean [mm] over known poses of the fibres' mean moment arm minus the published arm (centre of a range), or NaN."""
+        """The mean [mm], over known poses, of the fibres' mean moment arm minus the published arm, or the centre of the published
+        range; NaN without a known pose.
+        """
         return float(self._off.mean()) if self._off.size else float("nan")
 
     @property

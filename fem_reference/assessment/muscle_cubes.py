@@ -13,7 +13,7 @@ from fem_reference.problems.cubes import FREE, CubeState, loaded
 
 Material = tuple[Effect, ...]
 SQUEEZED, STRETCHED = 0.9, 1.1
-_CLEAR = 0.01  # the fraction by which a stiffness must differ to count as softer or stiffer
+_CLEAR = 0.01  # the fraction by which the stiffness of a cube must differ for it to count as softer or stiffer
 # The volume law of the case hip_flexion, after Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 VOLUME = make("incompressible_penalty", bulk="10 MPa")
 FIBRES = {"stress": 0.3, "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4}
@@ -72,8 +72,8 @@ def stiffness_ratio(stretch: float) -> Callable[[Material], float]:
 
 
 def _extreme(material: Material, *, degrees: float, softest: bool) -> float:
-    """1 if, of cubes with fibres at 0, 45 and 90 degrees to the load, that at ``degrees`` is the softest (or the stiffest) by more
-    than 1 %, else 0.
+    """1 if, of cubes with fibres at 0, 45 and 90 degrees to the load, the one at ``degrees`` is the softest (or the stiffest) by
+    more than 1 %, else 0.
     """
     found = {angle: abs(stress(material, SQUEEZED, angle)) for angle in (0.0, 45.0, 90.0)}
     own = found.pop(degrees)

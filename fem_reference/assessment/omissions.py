@@ -44,7 +44,7 @@ class Omission:
         return self.costs.get("seconds_processor_solve", self.costs.get("seconds_processor", math.nan))
 
     def phase(self, name: str) -> float:
-        """The processor time [s] of one of ``PHASES``: its fraction of the solving time times :attr:`seconds`; NaN if unknown."""
+        """The processor time [s] of one of ``PHASES``: :attr:`seconds` times its fraction of the solving time; NaN if unknown."""
         spent = sum(self.costs.get(f"seconds_{part}", math.nan) for part in PHASES[name])
         return self.seconds * spent / (self.costs.get("seconds_solve") or math.nan)
 

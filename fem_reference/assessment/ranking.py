@@ -1,4 +1,4 @@
-"""Ranking of solvers by their distance from the reference; differences within the error bars are not ranked."""
+"""Ranking of solvers by their distance from the reference; solvers whose error bars overlap share a rank."""
 
 import math
 from collections.abc import Iterable
@@ -75,8 +75,8 @@ def _less(one: Deviation, other: Deviation) -> bool:
 
 
 def rankings(measured: dict[str, tuple[Measure, ...]], bars: Iterable[Measure]) -> tuple[Ranking, ...]:
-    """The rankings by each statistic that is ranked, among the runs that have this statistic. ``measured``: the measures of each
-    run against the reference, by name. ``bars``: the error bars of deviations; a statistic without a bar is left out.
+    """The rankings by each statistic that serves for ranking, among the runs that have it. ``measured``: the measures of each run
+    against the reference, by name. ``bars``: the error bars of deviations; a statistic without a bar is left out.
     """
     known, found = tuple(bars), []
     for key, stated in described("rank").items():

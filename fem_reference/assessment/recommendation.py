@@ -57,11 +57,11 @@ class Margins:
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """The recommended setting (``best``) out of ``count`` settings, with ``margins`` included; None if no setting meets the limits.
+    """The recommended setting (``best``) out of ``count`` settings, None if no setting meets the limits.
 
-    ``nearest``: if none meets them, the setting that exceeds them least. ``of``: the cases on which the settings were measured.
-    ``measured``: True if they were measured on the case itself. ``loads``: by setting, the fraction of the machine that other
-    processes used.
+    ``nearest``: if none meets them, the setting that exceeds them least. ``margins``: the factors in the expected errors and times.
+    ``of``: the cases on which the settings were measured. ``measured``: True if they were measured on the case itself. ``loads``:
+    for each setting, the fraction of the machine that other processes used.
     """
 
     best: Expected | None
@@ -118,7 +118,7 @@ def known_settings(features: Features, case: str, studies: Sequence[CaseStudy], 
 
 
 def _comparable(features: Features, case: str, studies: Sequence[CaseStudy], metric: str) -> Sequence[CaseStudy]:
-    """The ``studies`` comparable with a case with these ``features``. Lengths scale with motion, so the bones must move."""
+    """The ``studies`` comparable with a case with these ``features``. Errors in mm scale with motion, so the bones must move."""
     if _is_share(metric):
         return studies
     if not features["motion"] > 0:
@@ -183,7 +183,7 @@ def _expected(features: Features, studies: Sequence[CaseStudy], metric: str, mar
 
 
 def scale(features: Features, other: Features, metric: str) -> float:
-    """The factor that turns an error on the ``other`` case into one on this case. Lengths scale with motion; percentages do not."""
+    """The factor from an error on the ``other`` case to one on this case. Errors in mm scale with motion; percentages do not."""
     return 1.0 if _is_share(metric) else features["motion"] / other["motion"]
 
 

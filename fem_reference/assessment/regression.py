@@ -167,7 +167,7 @@ def _judged(
 
 
 def _word(was: float, value: float, truth: float, bar: float, *, allowed: float) -> Word:
-    """The verdict on one frame: inconclusive if both values are NaN, and fail if a number is new."""
+    """The verdict on one frame: inconclusive if both values are NaN, fail if there was no number before."""
     if math.isnan(was) and math.isnan(value):
         return "inconclusive"
     if math.isnan(truth):

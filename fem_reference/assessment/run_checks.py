@@ -28,11 +28,11 @@ from fem_reference.runs.store import Run
 ROUNDING = 1e-9
 # The error of exactly attached vertices may be this strain (a stretch of 4) times their distance from the attached facets.
 _STRAIN = 3.0
-# Safety factor on the mean extension of springs that follows from the recorded force, as springs do not pull at vertices.
+# Safety factor on the mean extension of springs from the recorded force: the extension is computed at vertices, not at springs.
 _SPRINGS = 1.5
 # The maximum rotation of a bone per load step, on average between two frames; beyond it the sense of rotation is unknown.
 _TURN = 1.01 * math.pi / 2
-# The penetration of a crease between contact points, as a fraction of the spacing; a right-angled edge has more (``BETWEEN``).
+# The penetration of a crease between contact points, as a fraction of the spacing; right-angled edges penetrate more (``BETWEEN``).
 _CREASE = 0.1
 # The penetration that self-contact of a part allows, for any recorded pressure, is less than this fraction of the spacing.
 _OWN = 0.5
@@ -98,7 +98,7 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
 
 
 def _overlaps(body: Body, solved: Run) -> Iterator[RunCheck]:
-    """Overlap of parts that may touch; overlap due to smoothing, compliance, gaps between points and the rest state is allowed."""
+    """Overlap of parts that may touch; overlap at rest or due to smoothing, compliance or gaps between points is allowed."""
     for law in body.touching:
         edge, between, depth = longest_edge(body.mesh, law), unseen(body.mesh, law), partial(overlap_at, body.mesh, law)
         at_rest = depth(body.mesh.points) if law.relaxed else 0.0
@@ -162,9 +162,9 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
 
 
 def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
-    """The distance of exactly attached vertices from their positions on the bone: a strain times their distance from attached
-    facets is allowed. For springs, the mean extension: the force (with ``in_situ``, plus that at rest) over stiffness and
-    area is allowed.
+    """The distance of exactly attached vertices from their positions on the bone; the limit is a strain times their distance from
+    the attached facets. For springs, the mean extension; the limit follows from the force (with ``in_situ``, plus the force at
+    rest), divided by stiffness and area.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets = Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])
@@ -266,7 +266,7 @@ def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck
 
 
 def _deep(bone: Bone, number: int, give: float, muscle: Surface, rest: Surface, *, pressed: bool) -> RunCheck:
-    """The overlap of bone and muscle. Above ``give`` only the excess over rest counts; deep inside the bone the check fails."""
+    """The overlap of bone and muscle. Above ``give``, only the excess over rest counts; deep inside the bone the check fails."""
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
     half, (deepest, place) = bone.shape.half_thickness, found.deepest()
     if deepest > give:

@@ -25,10 +25,10 @@ class Standing(Record):
     ``worst``: by ``metric.statistic``, the maximum deviation over the frames; empty for the reference, which has error ``bars``
     instead. ``from_rest``: the rms distance [mm] between the surfaces in the first and last frame, if the reference is back at rest
     then. ``unsound``: the reason why the frames are unusable. ``split``: the root mean squares [mm] of the parts of the error.
-    ``least_error``: the error [mm] if the time is at most ``MATCHED_TIME``. ``least_time``: the time [s] if the error is at most
-    ``MATCHED_ERROR``. ``truth`` and ``run``: the keys of the reference and of the run. ``frames``: a hash of the positions.
-    ``stale``: True if case, reference, solver, protocol or time limit have changed since the ``date``. ``time_limit``: the allowed
-    processor time [s].
+    ``least_error``: the error [mm], None unless the time is at most ``MATCHED_TIME``. ``least_time``: the time [s], None unless the
+    error is at most ``MATCHED_ERROR``. ``truth`` and ``run``: the keys of the reference and of the run. ``frames``: a hash of the
+    positions. ``stale``: True if case, reference, solver, protocol or time limit have changed since the ``date``. ``time_limit``:
+    the allowed processor time [s].
     """
 
     case: str
@@ -110,8 +110,8 @@ class Standings(Record):
 
 @dataclass(frozen=True)
 class OverCases:
-    """A solver over ``count`` cases. ``share``: the median of its error, in per cent of the maximum displacement; NaN for the
-    reference. ``seconds``: the median of its time [s]. ``lost``: the cases on which it failed.
+    """A summary of a solver over ``count`` cases. ``share``: the median of its error, in per cent of the maximum displacement; NaN
+    for the reference. ``seconds``: the median of its time [s]. ``lost``: the cases on which it failed.
     """
 
     group: str

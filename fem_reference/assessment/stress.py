@@ -1,4 +1,4 @@
-"""Results of hard cases: a cell for each case and solver, with the verdict and the evidence for it."""
+"""Results of hard cases: a table cell for each case and solver, with the verdict and the evidence for it."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ class History:
     points: Floats | None = None
 
     def worst(self, frame: Literal["any", "last"]) -> int:
-        """The index of the decisive frame, the last or that with the largest value; NaN counts as the largest."""
+        """The index of the decisive frame: the last, or the one with the largest value; NaN counts as the largest."""
         if frame == "last":
             return len(self.values) - 1
         return int(np.argmax(np.where(np.isnan(self.values), np.inf, self.values)))

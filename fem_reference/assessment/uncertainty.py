@@ -1,4 +1,4 @@
-"""Records of uncertainty: bands of a case's results for uncertain parameters, sensitivities, and candidates compared with bands."""
+"""Records of uncertainty: bands of results if parameters are uncertain, sensitivities, and candidates compared with bands."""
 
 import math
 from dataclasses import dataclass, field
@@ -59,7 +59,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Failure:
-    """A run of the design without a result: its parameters (``values``) by key, and the reason (``status`` and ``message``)."""
+    """A run without a result: its parameters (``values``) by key, and the reason (``status`` and ``message``)."""
 
     values: dict[str, float]
     status: str
@@ -144,11 +144,11 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """The ``bands`` of a case, from a design of ``runs`` with a ``seed``.
+    """The ``bands`` of a case, from a number of ``runs`` with parameters sampled by means of a ``seed``.
 
     ``size`` [mm]: the size of the tetrahedra. ``fixed``: the titles of the parameters that were not varied. ``failures``: the runs
     without a result. ``placed``: the candidates compared with the bands. ``lost``: the reasons why candidates have no run.
-    ``seconds``: the mean processor time of a run. ``origin``: the provenance. ``refused``: the reason if the case itself has no
+    ``seconds``: the mean processor time of a run. ``origin``: the provenance. ``refused``: the reason why the case itself has no
     solution, otherwise empty.
     """
 
@@ -171,8 +171,8 @@ class Uncertainty:
 def place(candidate: str, band: Band, values: Floats) -> Placed:
     """Compare the ``values`` (f,) of a candidate with a band.
 
-    A value is inside or outside the band if its distance from the end of the band exceeds the error bar of the reference, otherwise
-    undecided. Without a bar it is undecided too. A value that is not finite has "no answer".
+    A value is inside or outside the band if its distance from the nearer end of the band exceeds the error bar of the reference,
+    otherwise undecided. Without a bar it is undecided too. A value that is not finite has "no answer".
     """
     bar = np.full(len(values), math.nan) if band.bar is None else band.bar
     above, below = band.high - values, math.inf if band.distance else values - band.low

@@ -71,7 +71,7 @@ class Change:
 
     @property
     def size(self) -> float:
-        """The number by which changes are sorted: the change in error bars or, without bars, relative to the maximum distance."""
+        """The number by which changes are sorted: the change as a multiple of the bar or, without bars, of the maximum distance."""
         whole = np.nanmax([*self.greatest, 1e-300])
         return abs(self.by / whole) if math.isnan(self.in_bars) else abs(self.in_bars)
 

@@ -23,7 +23,7 @@ from fem_reference.io.formats import Format, formats, vtk
 from fem_reference.io.formats.msh import read_mesh
 from fem_reference.io.texts import beside, check_size, is_file, parsed_xml
 
-# The maximum size in bytes of a mesh, a table or an index: a million triangles, which is more than our meshers and solvers can use.
+# The maximum size in bytes of a mesh, table or index file. A million triangles fit, more than our meshers and solvers can use.
 # The values of a text file need up to thirty times as much memory as the file.
 MOST_BYTES = 2**26
 # A half-written file that is older than this [s] is removed unless its process is still running on this machine. A newer file may
@@ -227,7 +227,7 @@ def _unwritten(path: Path, error: OSError) -> OSError:
 
 
 def clear(path: Path) -> None:
-    """Remove half-written copies of ``path``, a file or a folder, that killed processes have left behind."""
+    """Remove half-written copies of the file or folder ``path`` that killed processes have left behind."""
     for part in path.parent.glob(f".{glob.escape(path.stem)}-*{glob.escape(path.suffix)}"):
         process = part.name.removeprefix(f".{path.stem}-").removesuffix(path.suffix)
         with suppress(OSError):

@@ -98,8 +98,8 @@ class DataSet(NamedTuple):
 
 
 def checked_cells(sizes: Any, corners: Any, points: int) -> PointLists:
-    """Cells of ``sizes`` (m,) with their points in ``corners``, for a number of ``points``. Raises ValueError if a size is
-    negative, if the sizes do not fit the corners, or if a cell has a point that does not exist.
+    """Cells of ``sizes`` (m,) with their points in ``corners``. ``points``: the number of existing points. Raises ValueError if a
+    size is negative, if the sizes do not fit the corners, or if a cell has a point that does not exist.
     """
     sizes, corners = np.asarray(sizes, np.int64), np.asarray(corners, np.int64)
     if (sizes < 0).any() or (sizes > len(corners)).any() or sizes.sum() != len(corners):

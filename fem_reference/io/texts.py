@@ -74,7 +74,7 @@ def check_no_entities(text: bytes) -> None:
 
 
 def beside(path: Path, name: str) -> Path:
-    """The file ``name`` to which the file at ``path`` refers. Raises ValueError if it is outside the folder of that file."""
+    """The file ``name`` to which the file at ``path`` refers. Raises ValueError if ``name`` is outside the folder of that file."""
     found = path.parent / name
     if not found.resolve().is_relative_to(path.parent.resolve()):
         raise ValueError(f'a reference to "{name}", outside the folder of the file')

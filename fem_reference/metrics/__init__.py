@@ -32,9 +32,9 @@ Shown = Literal["main", "table", "headline", "curve", "angle", "solvers", "scene
 
 @dataclass(frozen=True)
 class Statistic:
-    """The description of a statistic by its metric.
+    """The description of a statistic, stated by its metric.
 
-    ``title`` and ``part``: headings of the group of columns and of the column. ``headline``: a sentence with ``{}`` for the value.
+    ``title`` and ``part``: headings of the group of columns and of the column. ``headline``: a phrase with ``{}`` for the value.
     ``curve``: the title of the plot of changes from rest. ``share_of``: the quantity that is 100 %. ``shown``: by place, the rank
     of the statistic in the order there, the lowest first. ``local``: True if its error converges like that of the worst point.
     ``lone``: True for the value of a single fibre or of the force on a bone, which is not a mean. ``pooled``: True if the
@@ -266,9 +266,9 @@ def at_rest(run: Run) -> Run:
 
 
 def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
-    """All statistics of the change from rest of a ``run`` by the reference's solver, measured on the fibres of this run: if
-    overlaps with bones are removed at the start, the fibres of two runs differ at rest, and otherwise a surface would have to carry
-    the fibres of another run.
+    """All statistics of the change from rest of a ``run`` by the reference's solver, measured on the fibres of this run. If
+    overlaps with bones are removed at the start, the fibres of two runs differ at rest. To measure both on the same fibres, the
+    surface of one run would have to carry the fibres of the other.
     """
     own = context if run.fibres is None else replace(context, fibres=run.fibres)
     return measure(run, at_rest(run), own, wanted)

@@ -24,7 +24,7 @@ OF, AGAINST = "surface", "reference"
 
 
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """Statistics over the edges of the angle minus the angle in the reference [deg], in (-180, 180].
+    """Statistics, over the edges, of the angle minus the angle in the reference [deg], in (-180, 180].
 
     ``mean``: the signed mean, positive if edges are more convex. ``rms``: the root mean square. ``mean_magnitude``, ``p95`` and
     ``max``: the mean, the 95th percentile and the maximum of the magnitude. An edge is weighted by the area around it at rest,

@@ -1,7 +1,7 @@
 """Energy stored in a muscle by all its effects, but not in attachment springs or contact; only some solvers compute it.
 
-Apart from springs, contact and dissipation, the change of energy is the work of the bones, and its derivative with respect to a
-joint angle is minus the moment.
+Apart from springs, contact and dissipation, the change of energy is the work of the bones, and the derivative of the energy with
+respect to a joint angle is minus the moment.
 """
 
 from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures

@@ -1,4 +1,4 @@
-"""Distances of the ends of fibres from their positions on moving bones, in the run alone, independent of the reference.
+"""Distances of the ends of fibres in a run from the points to which bones would carry them, independent of the reference.
 
 The end of a fibre at an attachment moves with its bone. A fibre from a file may end near the attached area without reaching it.
 Such a fibre does not follow the bone, and differs in length and moment arm from fibres that reach the area. In a run without

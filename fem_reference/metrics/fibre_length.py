@@ -4,8 +4,8 @@ If both runs carry the fibres of the measurement context in their interior, thes
 both runs carry the fibres, by the extension in the measurement context, so that both runs are measured in the same way. The length
 of a fibre includes its straight tendon, if it has one.
 
-A run of lines alone (lines of action) has its own fibre points. Its total length is compared, so a straight line that is shorter
-than the fibre deviates even at rest. This counts as an error, even if the change of length from rest is correct.
+A run of lines alone (lines of action) has its own fibre points. The total length of each line is compared, so a straight line that
+is shorter than the fibre deviates even at rest. This counts as an error, even if the change of length from rest is correct.
 """
 
 from functools import partial
@@ -41,7 +41,7 @@ _RELAXED = 5.0
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Statistics over the fibres of ``L - L_reference`` [mm]: the signed ``mean``, the ``rms`` and the maximum magnitude ``max``.
+    """Statistics, over the fibres, of ``L - L_reference`` [mm]: the signed ``mean``, the ``rms`` and the maximum magnitude ``max``.
     ``mean_percent``, ``rms_percent`` and ``max_percent``: the same in per cent of the length of each fibre at rest.
     """
     found, expected = both_lengths(run, reference, context)
@@ -72,8 +72,7 @@ def fibre_points(run: Run, context: MeasurementContext) -> Floats:
 
 @np.errstate(over="ignore", invalid="ignore")
 def extension_error(reference: Run, context: MeasurementContext) -> Measure:
-    """The maximum error [mm], over the fibres, of lengths computed by the extension, measured on the surface of the reference
-    itself.
+    """The maximum error [mm], over the fibres, of the lengths that the extension gives for the surface of the reference itself.
 
     The error is the length by the extension minus the length in the interior; NaN if the reference does not carry the fibres of the
     measurement context.

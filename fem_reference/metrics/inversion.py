@@ -1,6 +1,6 @@
 """Fractions of a run's surface that are inside out or lie within another part of the body, compared with the reference.
 
-These fractions need only the surface, so every run has them. For a solver with an interior, the smallest det F is stricter.
+These fractions need only the surface, so every run has them. For a solver with an interior, the smallest det F is a stricter test.
 """
 
 from functools import lru_cache

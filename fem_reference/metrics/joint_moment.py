@@ -5,8 +5,8 @@ fixed in space. By virtual work, without dissipation, the moment is minus the de
 angle. Lines of action pull at their ends, at via-points and at obstacles. The force is unknown for lines without the Hill model
 (``hill``) and for most fast solvers.
 
-This moment arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent matrix carries a moment with
-little force (docs/measures.md).
+This moment arm differs from that of ``moment_arm``, which follows from the excursion of fibres: a bent muscle matrix carries a
+moment with little force (docs/measures.md).
 """
 
 from functools import partial
@@ -60,7 +60,7 @@ def _has_force(run: Run, joint: Joint) -> bool:
 
 
 def _values(run: Run, joint: Joint) -> Floats:
-    """The moment, the force and the moment arm in each frame (3, f).
+    """The moment, the force and the moment arm (3, f) in each frame.
 
     For a muscle that is a line between two bones, or around obstacles on these bones, the arm is ``-dl/dtheta``. For any other
     muscle it is, by virtual work, the mean of ``-dl/dtheta`` over all parts that pull, weighted by their shares of the resultant.

@@ -1,9 +1,9 @@
 """Moment arms of the fibres about the rotating joint, by the tendon excursion method: ``-dl/dtheta`` (An et al. 1984).
 
 ``l`` [mm] is the length of a fibre and ``theta`` [rad] the angle of the joint. The moment arm is positive if the muscle shortens as
-the angle increases, as in OpenSim. The slope is that of the parabola through the frame and the two frames nearest in
-time that have other angles; its error is of second order in the differences between these angles. If more than one bone moves,
-lengths do not depend on a single angle, and the moment arm is NaN. A case without a joint has no moment arms.
+the angle increases, as in OpenSim. The slope is that of the parabola through the lengths in the frame and in the two
+frames nearest in time that have other angles; its error is of second order in the differences between these angles. If more than
+one bone moves, lengths do not depend on a single angle, and the moment arm is NaN. A case without a joint has no moment arms.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,7 +33,7 @@ _SAME = 1e-9
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Statistics over the fibres of ``r - r_reference`` [mm]: ``mean``, ``rms``, minimum (``least``), maximum (``greatest``) and
+    """Statistics, over the fibres, of ``r - r_reference`` [mm]: ``mean``, ``rms``, minimum (``least``), maximum (``greatest``) and
     maximum magnitude (``max``).
     """
     if not context.joints or len(run.numbers) < 2:
@@ -72,7 +72,7 @@ def turning(joints: Sequence[Joint], context: MeasurementContext, numbers: Seque
 
 
 def _near(angles: Floats, frame: int) -> list[int]:
-    """The ``frame`` and up to two frames nearest in time with other angles, among which the joint does not reverse."""
+    """The ``frame`` and up to two frames nearest in time with other angles, between which the joint does not reverse."""
     before = list(_onward(angles, range(frame - 1, -1, -1), frame))
     after = list(_onward(angles, range(frame + 1, len(angles)), frame))
     if before and after and (angles[frame] - angles[before[0]]) * (angles[after[0]] - angles[frame]) > 0:

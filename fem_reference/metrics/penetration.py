@@ -50,7 +50,7 @@ class _Worst(NamedTuple):
 
 def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
     """``deepest`` [mm]: the maximum depth of the muscle below the surface of a bone, 0 if nothing is inside. ``volume`` [mm3]: the
-    volume of the muscle inside bones, without the part that is nearest to the exempt surface.
+    volume of the muscle inside bones, without the part whose nearest triangle is exempt from contact.
 
     A triangle follows a bone if its corners are at most r from the bone and its edges at most 4 r long, where r is the reach of
     ``Exemption``. A greater depth between its corners then only shows that a flat triangle cuts into a round bone. So depth is

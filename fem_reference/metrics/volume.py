@@ -1,4 +1,4 @@
-"""Volume of a run, compared with the reference, frame by frame."""
+"""Volume enclosed by the surface of a run, compared with the reference, frame by frame."""
 
 import numpy as np
 

@@ -22,7 +22,7 @@ _COMPONENTS |= dict.fromkeys(("GLOBAL_IDS", "PEDIGREE_IDS", "EDGE_FLAGS"), 1)
 
 
 def read(data: bytes) -> DataSet:
-    """The data set in the bytes of a file; other sections are skipped. Raises ValueError or another exception if incomplete."""
+    """The data set in the bytes of a file; other sections are skipped. Raises ValueError or another error if it is incomplete."""
     head = _HEAD.match(data)
     if head is None:
         raise ValueError("no header of a VTK file")

@@ -27,7 +27,7 @@ _MOST = 2**28
 
 
 def read(data: bytes) -> DataSet:
-    """The data set in the bytes of a file, with its pieces joined. Raises ValueError or another exception if invalid."""
+    """The data set in the bytes of a file, with its pieces joined. Raises ValueError or another exception if it is invalid."""
     head, mark, appended = data.partition(b"<AppendedData")
     check_no_entities(head)
     if mark and not _END.search(data, max(0, len(data) - 1000)):
