@@ -135,7 +135,7 @@ class FieldState:
 @dataclass(frozen=True)
 class Place:
     """Point at which an effect on a scalar field acts. ``position``: (x, y, z), (x, y) or (x,); ``functions``: the functions that
-    formulas may call, by name; ``upper``: the fraction of the element that lies above the mean y of the vertices.
+    formulas may call, by name; ``upper``: the fraction of the element that lies above the mean y of all vertices.
     """
 
     position: Sequence[Any]

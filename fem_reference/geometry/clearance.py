@@ -70,5 +70,5 @@ def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
 
 
 def _least_of_four(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Minimum of four consecutive values along each axis; the result is shorter than ``values`` by three along each axis."""
+    """Minimum of each block of four values along each axis; the result is shorter than ``values`` by three along each axis."""
     return np.asarray(scipy.ndimage.minimum_filter(values, size=4)[(slice(2, -1),) * values.ndim])

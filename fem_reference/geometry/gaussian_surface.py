@@ -27,7 +27,8 @@ _PROJECTIONS, _THERE = 12, 1e-9
 @dataclass(frozen=True, eq=False)
 class GaussianSurface:
     """The surface on which ``sum_i exp(-|x - centres_i|^2 / radii_i^2)`` is 1. ``centres`` (m, 3) and ``radii`` (m,) [mm] are four
-    parameters for each Gaussian. One Gaussian gives a point; n Gaussians at one centre give a sphere of radius ``r sqrt(log n)``.
+    parameters for each Gaussian. One Gaussian gives a point; n Gaussians of radius r about one centre give a sphere of radius
+    ``r sqrt(log n)``.
     """
 
     centres: Floats
@@ -58,8 +59,8 @@ class GaussianSurface:
 
 
 def fit(surface: Surface, count: int) -> GaussianSurface:
-    """Fit ``count`` Gaussians to a closed ``surface``, by nonlinear least squares of the distances at vertices and at points on
-    both sides of them, robust against outliers.
+    """Fit ``count`` Gaussians to a closed ``surface``, by nonlinear least squares, robust against outliers, of the distances at
+    vertices and at points on both sides of them.
 
     The fit is deterministic. Rotating or scaling the surface rotates or scales the fit, up to rounding, if the principal axes of
     the surface are distinct.
@@ -122,7 +123,7 @@ def _samples(surface: Surface) -> tuple[Floats, Floats]:
 
 
 def _axes(away: Floats) -> Floats:
-    """Principal axes (3, 3) of points at ``away`` (n, 3) from their mean, right-handed, the first two towards the longer tail."""
+    """Principal axes (3, 3), right-handed, of points at ``away`` (n, 3) from their mean; the first two point to the longer tail."""
     axes = np.linalg.svd(away, full_matrices=False)[2]
     first, second = np.where(((away @ axes[:2].T) ** 3).sum(axis=0)[:, None] < 0, -axes[:2], axes[:2])
     return np.stack([first, second, np.cross(first, second)])

@@ -91,5 +91,5 @@ def _rule(element: skfem.ElementTriP2 | skfem.ElementTetP2) -> tuple[Floats, Flo
 
 
 def quadratic(nodal: Floats) -> Floats:
-    """Values (k, 10, c) at the ten nodes of tets, from ``nodal``: these values or, if linear, the values (k, 4, c) at corners."""
+    """Values (k, 10, c) at the ten nodes of tets. ``nodal``: these values or, if linear, the values (k, 4, c) at the corners."""
     return nodal if nodal.shape[1] == 10 else np.concatenate([nodal, nodal[:, EDGES].mean(axis=2)], axis=1)
