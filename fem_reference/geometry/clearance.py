@@ -34,7 +34,7 @@ class Clearance:
         found = self.away[tuple(nodes.T)] - self.spacing * np.linalg.norm(within - nodes, axis=1)
         beyond = self.spacing * np.linalg.norm(at - within, axis=1)
         # The grid is convex, so the segment from the point to the nearest point of the grid makes an angle of at least 90 degrees
-        # with any segment from there into the grid.
+        # with any segment from that nearest point into the grid.
         found = np.where(beyond > 0, np.hypot(beyond, np.maximum(found, 0)), found)
         return np.where(known, found, np.nan)
 

@@ -1,4 +1,4 @@
-"""Closed surfaces as level sets of a sum of Gaussians (report DCSE/TR-2022-03, 7.1; Carr et al. 2001, 10.1145/383259.383266)."""
+"""Closed surfaces: level sets of a sum of Gaussians (report DCSE/TR-2022-03, 7.1; Carr et al. 2001, doi 10.1145/383259.383266)."""
 
 from dataclasses import dataclass
 

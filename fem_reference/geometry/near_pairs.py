@@ -46,7 +46,7 @@ _kept = lru_cache(maxsize=8)(_Sorted)
 
 def near_pairs(one: Surface, other: Surface) -> Ints | None:
     """Find pairs (k, 2) of triangles of two surfaces, or of one surface with itself, that may intersect or touch. Each pair that
-    does is found once, along with a few that do not. Pairs of one surface are left out if the triangles share an edge or touch
+    does is found once, along with a few that do not. Pairs within one surface are left out if the triangles share an edge or touch
     only at a shared corner.
 
     Returns None without a compiler, or if a point is very far away or not finite. Further calls with the same ``other`` are faster.

@@ -138,7 +138,7 @@ class Capsule(_Rod):
 
 @dataclass(frozen=True)
 class Box(Exact):
-    """A box about ``centre`` of outer ``size`` [mm] along the axes, with edges and corners of the radius ``rounding`` [mm]."""
+    """A box of outer ``size`` [mm] along the axes, about ``centre``, with edges and corners of the radius ``rounding`` [mm]."""
 
     centre: Vector
     size: Vector

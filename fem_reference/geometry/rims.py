@@ -85,7 +85,7 @@ def _smoothed(surface: Surface, shares: Floats, length: float) -> Floats:
 
 
 def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
-    """Add a point in each island of an attachment that has at least ``least`` [mm2] but contains no point of the coarse surface."""
+    """Add a point in each island with an area of at least ``least`` [mm2] that contains no point of the coarse surface."""
     number = _islands(fine, shares)
     attached = number >= 0
     thirds = np.tile(triangle_areas(fine.points, fine.triangles)[:, None] / 3, 3)

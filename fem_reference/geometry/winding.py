@@ -28,7 +28,7 @@ _CHECKED = 200
 class Winding:
     """n paths through K ``knots`` (n, K, 3) [mm], with unit ``tangents`` (n, K, 3) and arc lengths ``arcs`` (n, K) [mm].
 
-    Each path passes the obstacles ``met`` (n, m) in this order, each with the same number of knots. If it passes fewer than m
+    Each path passes the obstacles ``met`` (n, m) in this order, with the same number of knots on each. If it passes fewer than m
     obstacles, the remaining knots are at its end. ``failed`` (n,) is True where Newton's method found no path.
     """
 
