@@ -41,7 +41,7 @@ class Moduli(NamedTuple):
 
 @dataclass(frozen=True)
 class State:
-    """State at a point from which an expression is computed. Each entry is a number, an array over points or a symbolic expression.
+    """State at a point, from which expressions are computed. Each entry is a number, an array over points or a symbolic expression.
 
     ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``. ``displacement``: (3,) [mm]. ``pressure``: the pressure unknown
     [MPa] of a mixed formulation, None if no effect adds it. ``fibre``: the unit vector (3,) along the fibres at rest, None without

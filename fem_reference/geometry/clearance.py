@@ -57,7 +57,7 @@ def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
     """Mask of the cells, three fewer than ``coefficients`` along each axis, in which a spline may be at or below ``level``.
 
     In a cell, the smallest of the 64 coefficients is a lower bound on the spline, and the smallest Bernstein coefficient is a
-    tighter bound. The largest coefficient is an upper bound, so cells that are entirely below the level need no further check.
+    tighter bound. The largest coefficient is an upper bound, so if it is at or below the level, no further check is needed.
     """
     found = _least_of_four(coefficients) <= level
     cells = np.argwhere(found & (-_least_of_four(-coefficients) > level))

@@ -15,8 +15,8 @@ from fem_reference.geometry.distance import farthest_points
 _INSIDE, _SAMPLES = 20_000, 1500
 # The distance from the surface to the samples on both sides of it, relative to the edge of a cube with the volume of the surface.
 _BESIDE = 0.05
-# The number of rounds of the fit, and the maximum number of evaluations in each round. Each round uses the gradients of the
-# level at the samples when the round begins.
+# The number of rounds of the fit, and the maximum number of evaluations in each round. Each round uses the gradients that
+# the level has at the samples when the round begins.
 _ROUNDS, _STEPS = 6, 8
 # The minimum and the maximum radius of a Gaussian, relative to the edge of a cube with the volume of the surface.
 _RADII = (0.02, 2.0)

@@ -29,7 +29,7 @@ class Winding:
     """n paths through K ``knots`` (n, K, 3) [mm], with unit ``tangents`` (n, K, 3) and arc lengths ``arcs`` (n, K) [mm].
 
     Each path passes the obstacles ``met`` (n, m) in this order, with the same number of knots on each. If it passes fewer than m
-    obstacles, the remaining knots are at its end. ``failed`` (n,) is True where Newton's method found no path.
+    obstacles, the remaining knots are at its end. ``failed`` (n,) is True where no valid path was found.
     """
 
     knots: Floats
