@@ -71,7 +71,7 @@ class Displaced:
         return sizes @ np.einsum("q,kqi->ki", _BULK, self.velocity), sizes @ moments
 
     def _facets(self, on: str) -> tuple[Ints, Ints]:
-        """Return the tet (m,) of each facet of a region, and the nodes (m, 6) of the facet: outward corners, then midpoints."""
+        """Return the tet (m,) of each facet of a region, and the facet's local nodes (m, 6): outward corners, then midpoints."""
         size = len(self.mesh.points)
         found, wanted = (
             (ends[:, 0] * size + ends[:, 1]) * size + ends[:, 2]

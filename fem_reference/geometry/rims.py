@@ -30,7 +30,7 @@ _SMOOTHED = 0.1
 _NEAR = 0.3
 # A vertex that cannot move and is nearer to a crossing than this fraction of the edge counts as lying on the rim.
 _THERE = 0.2
-# An edge across a piece of an attachment, or across a gap in it, is cut if more than this fraction of the edge is in it.
+# An edge across a piece of, or a gap in, an attachment is cut if more than this fraction of the edge is in the piece or gap.
 _NARROW = 0.3
 _REFINED = 2  # number of rounds of the search for narrow pieces and gaps
 _ISLAND = 0.1  # the minimum area of an island of an attachment that is kept, relative to the squared triangle size
