@@ -1,4 +1,4 @@
-"""Loads on a body: their amounts over time, their resultant forces and moments, and the integrals over the body that these need."""
+"""Loads on a body: amounts over time, resultant forces and moments, and the integrals over the body that the resultants need."""
 
 from typing import NamedTuple, Protocol
 

@@ -41,7 +41,7 @@ class Moduli(NamedTuple):
 
 @dataclass(frozen=True)
 class State:
-    """State at a point from which an expression is computed. Each entry is a number, an array over points or a symbolic expression.
+    """State at a point, from which expressions are computed. Each entry is a number, an array over points or a symbolic expression.
 
     ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``. ``displacement``: (3,) [mm]. ``pressure``: the pressure unknown
     [MPa] of a mixed formulation, None if no effect adds it. ``fibre``: the unit vector (3,) along the fibres at rest, None without
@@ -135,7 +135,7 @@ class FieldState:
 @dataclass(frozen=True)
 class Place:
     """Point at which an effect on a scalar field acts. ``position``: (x, y, z), (x, y) or (x,); ``functions``: the functions that
-    formulas may call, by name; ``upper``: the fraction of the element that lies above the mean y of the vertices.
+    formulas may call, by name; ``upper``: the fraction of the element that lies above the mean y of all vertices.
     """
 
     position: Sequence[Any]

@@ -165,7 +165,7 @@ def united(parts: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
 
 
 def check_finite(surface: Surface) -> None:
-    """Raise InputError if a surface has no triangles, points that are not finite or too far away, or invalid triangles."""
+    """Raise InputError if a surface has no triangles, a point that is too far away or not finite, or an invalid triangle."""
     if len(surface.triangles) == 0:
         raise InputError(surface.place, "no triangles", "a triangle surface")
     bad = np.flatnonzero(~np.isfinite(surface.points).all(axis=1))
@@ -189,7 +189,7 @@ def check_closed(surface: Surface) -> Surface:
     """Return the surface, oriented outwards, if it bounds one body.
 
     The surface must be finite, closed, manifold and consistently oriented, and use every point. Otherwise raises InputError with
-    the number of wrong edges, vertices or parts and the position of the first or the smallest.
+    the number of wrong edges, vertices or parts and the position of the first or the smallest of them.
     """
     check_finite(surface)
     points, triangles = surface.points, surface.triangles

@@ -1,4 +1,4 @@
-"""Names of the modules in folders in which each module is one file or folder."""
+"""Names of the modules in given folders; each module is one file or one folder."""
 
 import pkgutil
 from collections.abc import Iterable
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def names(places: Iterable[str]) -> tuple[str, ...]:
-    """Sorted names of the modules in the folders ``places``; a folder is listed again after a file in it was added or removed."""
+    """Sorted names of the modules in the folders ``places``; a folder is listed again if a file in it has been added or removed."""
     return _listed(tuple((place, Path(place).stat().st_mtime_ns) for place in places if Path(place).is_dir()))
 
 

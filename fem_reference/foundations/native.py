@@ -26,7 +26,7 @@ def machine() -> str:
 def library(source: Path, flags: Sequence[str], folder: Path) -> CDLL:
     """Load the functions of a C file, which is compiled with ``flags`` unless ``folder`` already contains the result.
 
-    Raises OSError if there is no compiler or the folder cannot be used, and RuntimeError with the compiler's message if that fails.
+    Raises OSError without a compiler or a usable folder, and RuntimeError with the compiler's message if the compiler fails.
     """
     compiler = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()
     key = hashlib.sha256("\n".join([source.read_text(encoding="utf-8"), *compiler, *flags, machine()]).encode())

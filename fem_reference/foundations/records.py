@@ -111,7 +111,7 @@ PartName = Annotated[str, AfterValidator(_check_part_name)]
 
 
 def parse[R](record: type[R], table: object, place: str) -> R:
-    """Convert ``table`` to a ``record`` or dataclass; errors name keys below ``place``, for example ``"case.toml: effect[0]"``."""
+    """Convert ``table`` to a ``record`` or dataclass; errors name keys inside ``place``, for example ``"case.toml: effect[0]"``."""
     try:
         strict = issubclass(record, Record)
         return TypeAdapter(record).validate_python(_turned(table, list, tuple) if strict else table)

@@ -38,7 +38,7 @@ def environment(**settings: str) -> dict[str, str]:
 
 
 def end_with_starter() -> None:
-    """End this process at most about two seconds after the end of its starter (direct or indirect), even if that was killed."""
+    """End this process at most about two seconds after its starter (direct or indirect) ends, even if the starter is killed."""
     starter = os.environ.get(_STARTER)
     if starter is not None:
         threading.Thread(target=_watch, args=(int(starter),), daemon=True).start()
@@ -114,7 +114,7 @@ class MachineTime(NamedTuple):
 
 
 def spent_since(before: MachineTime) -> dict[str, str]:
-    """Processor time of this process since ``before`` and load by other processes, as provenance of measured clock times."""
+    """Processor time of this process and its descendants since ``before``, and load by others, as provenance of clock times."""
     ours, load = MachineTime.now().ours - before.ours, before.load()
     found = {"processor time": f"{ours:.1f} s"}
     return found if load is None else found | {"load by other processes": f"{100 * load:.0f} % of the machine"}

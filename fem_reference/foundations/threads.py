@@ -1,4 +1,4 @@
-"""Threads that work on several items at a time, each with a resource such as a process, and code for one thread at a time."""
+"""Threads that work on several items at a time, each with a resource such as a process, and functions that run only once."""
 
 import threading
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ _MAKING = threading.RLock()
 
 def made_once[T](make: Callable[[], T]) -> Callable[[], T]:
     """Return a function that calls ``make`` when it is first called and returns that result from then on, in every thread. Only one
-    thread calls any ``make`` at a time.
+    thread at a time calls any ``make``.
     """
     results: list[T] = []
 

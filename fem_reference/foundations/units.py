@@ -85,10 +85,10 @@ def quantity(text: object, kind: str) -> float:
 
 @cache
 def _factor(unit: str, inside: str) -> float:
-    """Number of units ``inside`` in one ``unit``. If they are of different kinds, pint raises an error or the result is NaN."""
+    """Factor that converts ``unit`` to ``inside``. For units of different kinds, pint raises an error or the result is NaN."""
     if unit == inside or (unit, inside) in COMMON:
         return COMMON.get((unit, inside), 1.0)
-    with _ONE_BY_ONE:  # otherwise two threads could build a registry each, and pint cannot combine quantities of two
+    with _ONE_BY_ONE:  # pint cannot combine quantities of two registries, which two threads could otherwise build
         registry = _registry()
         one = registry.Quantity(1.0, registry.parse_units(unit))
         factor = float(one.to(inside or "dimensionless").magnitude)

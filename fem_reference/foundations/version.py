@@ -1,4 +1,4 @@
-"""Version of the package, which is stated in pages, files and stored runs, and versions of other packages."""
+"""Version of the package (stated on pages, in files and in stored runs), and versions of other packages."""
 
 import importlib.metadata
 from collections.abc import Iterable

@@ -14,7 +14,7 @@ from fem_reference.geometry.tetrahedra import check_size
 
 Counts = tuple[int, int, int]
 
-_SAME = 1e-6  # tolerance relative to the longest edge of the box: the rounding of single-precision coordinates
+_SAME = 1e-6  # tolerance relative to the longest edge of the box, for rounding errors of single-precision coordinates
 
 
 def fill(surface: Surface, size: float) -> TetMesh:

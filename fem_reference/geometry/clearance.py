@@ -34,7 +34,7 @@ class Clearance:
         found = self.away[tuple(nodes.T)] - self.spacing * np.linalg.norm(within - nodes, axis=1)
         beyond = self.spacing * np.linalg.norm(at - within, axis=1)
         # The grid is convex, so the segment from the point to the nearest point of the grid makes an angle of at least 90 degrees
-        # with any segment from there into the grid.
+        # with any segment from that nearest point into the grid.
         found = np.where(beyond > 0, np.hypot(beyond, np.maximum(found, 0)), found)
         return np.where(known, found, np.nan)
 
@@ -57,7 +57,7 @@ def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
     """Mask of the cells, three fewer than ``coefficients`` along each axis, in which a spline may be at or below ``level``.
 
     In a cell, the smallest of the 64 coefficients is a lower bound on the spline, and the smallest Bernstein coefficient is a
-    tighter bound. The largest coefficient is an upper bound, so cells that are entirely below the level need no further check.
+    tighter bound. The largest coefficient is an upper bound, so if it is at or below the level, no further check is needed.
     """
     found = _least_of_four(coefficients) <= level
     cells = np.argwhere(found & (-_least_of_four(-coefficients) > level))
@@ -70,5 +70,5 @@ def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
 
 
 def _least_of_four(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Minimum of four consecutive values along each axis; the result is shorter than ``values`` by three along each axis."""
+    """Minimum of each block of four values along each axis; the result is shorter than ``values`` by three along each axis."""
     return np.asarray(scipy.ndimage.minimum_filter(values, size=4)[(slice(2, -1),) * values.ndim])

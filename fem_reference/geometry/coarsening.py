@@ -76,9 +76,9 @@ def slide(points: Floats, triangles: Ints) -> Floats:
 
 
 def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> Floats:
-    """Part (k, 3) of the displacements ``steps`` (k, 3) [mm] of some points that keeps them on the surface: the tangential part at
-    a smooth point, the part along the edge at a sharp edge, and 0 at a corner. ``points`` (n, 3) [mm] and ``triangles`` (m, 3)
-    define the surface, and ``chosen`` (k,) are the indices of the displaced points.
+    """Reduce the displacements ``steps`` (k, 3) [mm] of some points to the part that keeps these points on the surface: the
+    tangential part at a smooth point, the part along the edge at a sharp edge, and 0 at a corner. ``points`` (n, 3) [mm] and
+    ``triangles`` (m, 3) define the surface, and ``chosen`` (k,) are the indices of the displaced points.
     """
     shares, directions = np.linalg.eigh(_normal_tensors(points, triangles))
     free = shares < _FREE * shares.sum(axis=1, keepdims=True)

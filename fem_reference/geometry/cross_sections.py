@@ -1,4 +1,4 @@
-"""Triangulated cross-sections of a muscle on which a field has a given value (isosurfaces), each mapped to the unit square.
+"""Triangulated cross-sections of a muscle, which are isosurfaces of a field, each mapped to the unit square.
 
 The rims of consecutive sections are matched point by point, so that a changing outline does not twist lines along the muscle.
 """
@@ -22,7 +22,7 @@ _SAMPLES = 360  # the number of points on each rim that are matched
 _REACH = 60  # the maximum deviation of a match from the common shift of the rims, in samples
 # Possible changes of the shift between consecutive matches, in samples; with -2 or less, matches would not stay in order.
 _STEPS = (-1, 0, 1, 2, 3)
-# The distance between matched points that costs as much as stretching the rim to twice its length, divided by the rim's length.
+# The distance between matched points, divided by the rim's length, that costs as much as stretching the rim to twice its length.
 _STIFFNESS = 0.01
 _WINDOW = 9  # the number of samples in the moving mean that smooths the matches
 _LEAST = 0.1  # the weight of the common shift in a match, which keeps matched points distinct
@@ -72,8 +72,8 @@ class CrossSection:
 
 
 def _around(loop: Floats) -> Floats:
-    """Positions (k,) of the points of a counter-clockwise ``loop`` (k, 2), as fractions of its length. They start where the loop
-    crosses the first axis farthest from the origin.
+    """Positions (k,) of the points of a counter-clockwise ``loop`` (k, 2), as fractions of its length. Position 0 is
+    the outermost point at which the loop crosses the positive first axis.
     """
     ahead = np.roll(loop, -1, axis=0)
     lengths = np.linalg.norm(ahead - loop, axis=1)
@@ -86,8 +86,8 @@ def _around(loop: Floats) -> Floats:
 
 
 def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection | None:
-    """Return the largest connected piece of the section of ``mesh`` on which the field with ``values`` (n,) at the points equals
-    ``level``, with its normal towards larger values. Returns None if there is no section or if that piece has holes.
+    """Cut ``mesh`` where the field with ``values`` (n,) at its points equals ``level``, and return the largest connected piece of
+    this section, with its normal towards larger values. Returns None if there is no section or if that piece has holes.
     """
     above = values - level
     above = np.where(np.abs(above) < _NUDGE, _NUDGE, above)
@@ -105,7 +105,9 @@ def cross_section(mesh: TetMesh, values: Floats, level: float) -> CrossSection |
 
 
 def _cut(mesh: TetMesh, above: Floats) -> tuple[Ints, Floats]:
-    """Return the cut edges (k, 3, 2) of each triangle in which a section cuts a tet, and a vector (k, 3) towards larger values."""
+    """Return the ends (k, 3, 2) of the edges of tets on which the corners of each triangle of a section lie, and a vector (k, 3)
+    from each triangle towards larger values.
+    """
     order = np.take_along_axis(mesh.tets, np.argsort(above[mesh.tets], axis=1, kind="stable"), axis=1)
     below = (above[order] < 0).sum(axis=1)
     patterns = {

@@ -18,8 +18,9 @@ Curve = Callable[[Floats], Floats]
 
 
 def knots(points: Floats, exponent: float = 1.0) -> Floats:
-    """Parameters (n,) of ``points`` (n, d), from 0 to 1, with steps proportional to distance**``exponent``: 0 for uniform, 0.5 for
-    centripetal and 1 for chordal knots. Raises InputError if there are fewer than two points or if consecutive points coincide.
+    """Parameters (n,) of ``points`` (n, d), from 0 to 1, with steps proportional to distance**``exponent``. The exponent is 0 for
+    uniform, 0.5 for centripetal and 1 for chordal knots. Raises InputError if there are fewer than two points or if consecutive
+    points coincide.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if len(points) < 2 or not (steps > 0).all():

@@ -13,7 +13,8 @@ from fem_reference.geometry.near_pairs import reached
 
 # The distance from a triangle to the sample point just outside it, as a fraction of the surface's diagonal.
 _STEP = 1e-5
-# The number of triangles whose depth within another part is computed: those farthest from the triangles outside all other parts.
+# The number of triangles whose depth within another part of a body is computed: those farthest from all triangles that are not
+# within another part.
 _WITHIN = 16
 
 

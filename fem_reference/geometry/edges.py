@@ -38,8 +38,8 @@ class Edges:
         """Dihedral angle (e,) [rad], in (-pi, pi], from the normal of the left triangle to the normal of the right triangle.
 
         The angle is 0 if the triangles are coplanar, pi / 2 at the edges of a box, negative at a concave edge, and NaN if a
-        triangle has no normal. It equals atan2((n x m) . d, n . m) with the unit normals n, m and the direction d of the edge:
-        eq. 5.23 of report DCSE/TR-2022-03 without its arccos, which loses the sign and, for small angles, digits.
+        triangle has no normal. It equals atan2((n x m) . d, n . m) with the unit normals n, m and the direction d of the edge.
+        Eq. 5.23 of report DCSE/TR-2022-03 has an arccos instead, which loses the sign and, for small angles, digits.
         """
         start, end = (points[corner] for corner in self.ends.T)
         along = end - start

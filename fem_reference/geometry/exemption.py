@@ -58,7 +58,7 @@ class Exemption:
     @classmethod
     def of(cls, surface: Surface, attached: Iterable[tuple[str, Floats]] = ()) -> "Exemption":
         """The exemption of a ``surface`` with m triangles. ``attached``: for each attachment, the name of its bone and an array
-        (m, 3) that is 1 at the corners of triangles that are attached and 0 at all others. The attached part is where the linear
+        (m, 3) that is 1 at the attached corners of the triangles and 0 at all others. The attached part is where the linear
         interpolation of these values is at least 1/2.
         """
         names, shares = zip(*attached, strict=True) if (attached := tuple(attached)) else ((), ())

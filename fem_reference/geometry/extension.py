@@ -21,7 +21,7 @@ _EDGE_ON = 1e-10
 @dataclass(frozen=True, eq=False)
 class Extension:
     """Extension of displacement from a surface to ``points`` (m, 3) [mm]. ``rest`` (n, 3) [mm]: the points of the surface at rest;
-    ``weights`` (m, n): the weights of the surface's displacements, which add up to 1 in each row.
+    ``weights`` (m, n): the weights of the displacements of these points; each row adds up to 1.
 
     The extension is exact for affine motion of the surface. On the surface it equals linear interpolation in the triangle.
     """

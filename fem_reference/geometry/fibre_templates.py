@@ -1,4 +1,4 @@
-"""Fibres of a template in the unit cube, mapped to sections of a muscle: the decomposition of Kohout and Kukacka.
+"""Fibres of a template in the unit cube, mapped to sections of a muscle, after Kohout and Kukacka.
 
 Their method (report DCSE/TR-2022-03, 6.1.2) uses isocontours on the surface. Here each contour is the rim of a section on which a
 Laplace field in tetrahedra is constant, and points inside come from a harmonic map of that section. These points are in the muscle;

@@ -163,8 +163,8 @@ def averaged(mesh: TetMesh, slopes: Floats) -> Floats:
 
 
 def _seeds(field: FibreField) -> Floats:
-    """Points (k, 3) off the skin at which the field is 1/2: the centre of each cut of a tet, and points halfway to the corners
-    of the cut.
+    """Points (k, 3) at which the field is 1/2, some distance below the skin: the centre of each cut of a tet, and points halfway
+    from there to the corners of the cut.
     """
     mesh = field.mesh
     ends = mesh.tets[:, EDGES]

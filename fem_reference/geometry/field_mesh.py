@@ -40,7 +40,7 @@ class FieldMesh:
         return np.asarray(found.rows[found.counts == 1])
 
     def edge_numbers(self, pairs: Ints) -> Ints:
-        """Index (k,) in ``edges`` of each pair of vertices in ``pairs`` (k, 2), which must be an edge."""
+        """Index (k,) in ``edges`` of each pair of vertices in ``pairs`` (k, 2); each pair must be an edge."""
         key = np.array([len(self.points), 1])
         return np.asarray(np.searchsorted(self.edges @ key, np.sort(pairs, axis=1) @ key))
 
@@ -59,7 +59,7 @@ class FieldMesh:
         return np.asarray(np.sqrt(np.maximum(np.linalg.det(gram), 0)) / (self.cells.shape[1] - 1))
 
 
-POINTS = 5  # the number of quadrature points along each direction: exact up to degree 9
+POINTS = 5  # the number of quadrature points along each direction, which makes the rule exact up to degree 9
 # The maximum magnitude of a coordinate, chosen so that areas and results computed from it are finite.
 FURTHEST = 1e50
 
@@ -121,13 +121,13 @@ def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: in
     along = np.einsum("mid,mik,k->md", tangents, slopes[:, 1:], velocity)
     with np.errstate(divide="ignore", invalid="ignore"):
         peclet = np.where(rates > 0, (along**2).sum(axis=1) / (2 * diffusion * rates), 0.0)
-        # Below 1e-3 the difference suffers from cancellation, so its series Pe / 3 - Pe^3 / 45 + ... is used.
+        # Below 1e-3 the difference suffers from cancellation, so the first term of the series Pe / 3 - Pe^3 / 45 + ... is used.
         upwind = np.where(peclet > 1e-3, 1 / np.tanh(peclet) - 1 / peclet, peclet / 3)
         return float(peclet.max()), np.where(rates > 0, upwind / (2 * rates), 0.0)
 
 
 def refined(mesh: FieldMesh) -> FieldMesh:
-    """Cut intervals in two, or triangles in four, at edge midpoints. Vertex i keeps its index; vertex n + j halves edge j."""
+    """Cut intervals into two, or triangles into four, at edge midpoints. Vertex i keeps its index; vertex n + j halves edge j."""
     cells: list[tuple[Ints, ...]]
     if mesh.cells.shape[1] == 2:
         a, b, ab = nodes(mesh, 2).T

@@ -28,7 +28,7 @@ from fem_reference.geometry.fibres import POINTS, FibreField, averaged, resample
 MOST = 1000  # the maximum number of fibres
 _LINES, _LINES_EACH = 1000, 8  # the minimum numbers of lines, in total and per fibre, from which fibres are chosen
 _ROUNDS = 50  # the maximum number of iterations of Lloyd's algorithm, which converges in fewer
-_PLASTIC = 1.324717957244746  # x^3 = x + 1: its powers spread points evenly (Roberts 2018, the R2 sequence)
+_PLASTIC = 1.324717957244746  # root of x^3 = x + 1; its powers spread points evenly (Roberts 2018, the R2 sequence)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +53,8 @@ class Flow:
 
 
 def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
-    """Compute the flow from the facets ``start`` of a ``mesh`` to ``end``, uniform over the area of both and 0 through the rest of
-    the boundary. It is the gradient of a potential u with ``-laplace u = 0`` and ``du/dn = -1/A_start``, ``1/A_end`` or 0.
+    """Compute the flow from facets ``start`` of a ``mesh`` to facets ``end``, uniform over the area of both and 0 through the
+    rest of the boundary. It is the gradient of a potential u with ``-laplace u = 0`` and ``du/dn = -1/A_start``, ``1/A_end`` or 0.
 
     The elements are of the Crouzeix-Raviart type. Their gradients are lowest-order Raviart-Thomas fields, so the flux out of a
     tetrahedron exactly equals the flux into the next (Marini 1985, SIAM J. Numer. Anal. 22:493).
@@ -79,10 +79,10 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
 
 
 def streamlines(flux: Flow, count: int) -> Polylines:
-    """Compute ``count`` lines of 40 points along ``flux``, each for equal areas of both attachments; InputError if too many.
+    """Compute ``count`` lines of 40 points along ``flux``, spread evenly over both attachments; InputError if too many.
 
-    More lines are started evenly over the area and grouped so that the groups are compact at both ends (Lloyd 1982), with distances
-    in units of the size of each attachment. The central line of each group is returned.
+    More lines than ``count`` are started evenly over the area and grouped so that the groups are compact at both ends (Lloyd 1982),
+    with distances in units of the size of each attachment. The central line of each group is returned.
     """
     if count > MOST:
         raise InputError("fibres.traced.count", count, f'at most {MOST} with flux = "area"')

@@ -1,4 +1,4 @@
-"""Closed surfaces as level sets of a sum of Gaussians (report DCSE/TR-2022-03, 7.1; Carr et al. 2001, 10.1145/383259.383266)."""
+"""Closed surfaces: level sets of a sum of Gaussians (report DCSE/TR-2022-03, 7.1; Carr et al. 2001, doi 10.1145/383259.383266)."""
 
 from dataclasses import dataclass
 
@@ -15,8 +15,8 @@ from fem_reference.geometry.distance import farthest_points
 _INSIDE, _SAMPLES = 20_000, 1500
 # The distance from the surface to the samples on both sides of it, relative to the edge of a cube with the volume of the surface.
 _BESIDE = 0.05
-# The number of rounds of the fit, and the maximum number of evaluations in each round. Each round uses the gradients of the
-# level at the samples when the round begins.
+# The number of rounds of the fit, and the maximum number of evaluations in each round. Each round uses the gradients that
+# the level has at the samples when the round begins.
 _ROUNDS, _STEPS = 6, 8
 # The minimum and the maximum radius of a Gaussian, relative to the edge of a cube with the volume of the surface.
 _RADII = (0.02, 2.0)
@@ -27,7 +27,8 @@ _PROJECTIONS, _THERE = 12, 1e-9
 @dataclass(frozen=True, eq=False)
 class GaussianSurface:
     """The surface on which ``sum_i exp(-|x - centres_i|^2 / radii_i^2)`` is 1. ``centres`` (m, 3) and ``radii`` (m,) [mm] are four
-    parameters for each Gaussian. One Gaussian gives a point; n Gaussians at one centre give a sphere of radius ``r sqrt(log n)``.
+    parameters for each Gaussian. One Gaussian gives a point; n Gaussians of radius r about one centre give a sphere of radius
+    ``r sqrt(log n)``.
     """
 
     centres: Floats
@@ -58,8 +59,8 @@ class GaussianSurface:
 
 
 def fit(surface: Surface, count: int) -> GaussianSurface:
-    """Fit ``count`` Gaussians to a closed ``surface``, by nonlinear least squares of the distances at vertices and at points on
-    both sides of them, robust against outliers.
+    """Fit ``count`` Gaussians to a closed ``surface``, by nonlinear least squares, robust against outliers, of the distances at
+    vertices and at points on both sides of them.
 
     The fit is deterministic. Rotating or scaling the surface rotates or scales the fit, up to rounding, if the principal axes of
     the surface are distinct.
@@ -122,7 +123,7 @@ def _samples(surface: Surface) -> tuple[Floats, Floats]:
 
 
 def _axes(away: Floats) -> Floats:
-    """Principal axes (3, 3) of points at ``away`` (n, 3) from their mean, right-handed, the first two towards the longer tail."""
+    """Principal axes (3, 3), right-handed, of points at ``away`` (n, 3) from their mean; the first two point to the longer tail."""
     axes = np.linalg.svd(away, full_matrices=False)[2]
     first, second = np.where(((away @ axes[:2].T) ** 3).sum(axis=0)[:, None] < 0, -axes[:2], axes[:2])
     return np.stack([first, second, np.cross(first, second)])

@@ -12,7 +12,7 @@ _GRID = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 
 
 def penetration(one: Surface, other: Surface) -> tuple[float, Floats]:
     """Return the depth [mm] to which two closed surfaces penetrate each other, 0 if they are apart, and the point (3,) with that
-    depth, the deepest of all vertices and of 28 sample points on each triangle that crosses the other surface.
+    depth. It is the deepest of all vertices and of 28 sample points on each triangle that crosses the other surface.
     """
     pairs = crossings(one, other)
     depths, places = [np.zeros(1)], [one.points[:1]]

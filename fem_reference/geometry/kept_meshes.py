@@ -59,7 +59,7 @@ def _arrays(mesh: TetMesh) -> Arrays:
 
 
 def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays], of_arrays: Callable[[Arrays], T]) -> T:
-    """Return what ``of_arrays`` reads from the file at ``path``; without a valid file, call ``make`` and store its result there."""
+    """Return what ``of_arrays`` reads from the file at ``path``; without a valid file, store and return the result of ``make``."""
     found = _read(path, of_arrays)
     if found is None:
         found = make()

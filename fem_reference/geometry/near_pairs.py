@@ -46,10 +46,10 @@ _kept = lru_cache(maxsize=8)(_Sorted)
 
 def near_pairs(one: Surface, other: Surface) -> Ints | None:
     """Find pairs (k, 2) of triangles of two surfaces, or of one surface with itself, that may intersect or touch. Each pair that
-    does is found once, along with a few that do not. Triangles of one surface are left out if they share an edge or touch only
-    at a shared corner.
+    does is found once, along with a few that do not. Pairs within one surface are left out if the triangles share an edge or touch
+    only at a shared corner.
 
-    Returns None without a compiler, or if a point is not finite or very far away. Further calls with the same ``other`` are faster.
+    Returns None without a compiler, or if a point is very far away or not finite. Further calls with the same ``other`` are faster.
     """
     code = _code()
     if code is None or not _moderate(one.points, other.points):
@@ -67,7 +67,7 @@ def near_pairs(one: Surface, other: Surface) -> Ints | None:
 
 def reached(surface: Surface, points: Floats, reach: Floats) -> Ints:
     """Indices (k,) of the triangles whose bounding boxes are within ``reach`` (n,) [mm] of one of ``points`` (n, 3) along each
-    axis. Without a compiler, or if a point is not finite or very far away, some triangles that are farther away are included.
+    axis. Without a compiler, or if a point is very far away or not finite, some triangles that are farther away are included.
     """
     if not len(points):
         return np.zeros(0, np.int64)
@@ -89,7 +89,7 @@ def _moderate(*places: Floats) -> bool:
 @lru_cache(maxsize=16)
 def parts_of(surface: Surface) -> tuple[Ints, Ints]:
     """Return the first vertex (k,) of each connected part of a ``surface``, and for each vertex (n,) the first vertex of its part,
-    where n - 1 is the highest vertex in the triangles. Raises ValueError if a vertex index is negative.
+    where n - 1 is the highest vertex index in the triangles. Raises ValueError if a vertex index is negative.
     """
     if surface.triangles.min(initial=0) < 0:
         raise ValueError("a triangle has a negative vertex number")

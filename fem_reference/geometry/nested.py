@@ -32,9 +32,9 @@ PARTS = np.array(
 )
 # The four parts of a face with corners 0 to 2 (a, b, c) and points 3 to 5 on its edges (ab, ac, bc).
 _FACE_PARTS = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2], [3, 5, 4]])
-# The position of the cut on an edge that begins at a rim, where displacement varies with the square root of the distance. With this
-# value, each refinement divides the error due to the rim by four: the order is 2 instead of 1 (Bacuta, Nistor and Zikatanov 2005,
-# doi 10.1007/s00211-005-0588-3). Where the solution is smooth, quadratic elements converge faster.
+# The position of the cut on an edge that begins at a rim, where displacement varies with the square root of the distance from the
+# rim. With this value, each refinement divides the error due to the rim by four: the order is 2 instead of 1 (Bacuta, Nistor and
+# Zikatanov 2005, doi 10.1007/s00211-005-0588-3). Where the solution is smooth, quadratic elements converge faster.
 GRADED = 0.25
 # A point moves towards the surface only as far as the tets around it keep at least these fractions of their volume and quality.
 _KEPT_VOLUME, _KEPT_QUALITY = 0.3, 0.5

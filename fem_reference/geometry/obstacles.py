@@ -46,7 +46,7 @@ class Quadric:
         return replace(self, pose=pose @ self.pose)
 
     def level(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return the level (n,), the sum of (x / a)^2 minus 1, at ``points`` (n, 3), and its gradients (n, 3)."""
+        """Return the level (n,) at ``points`` (n, 3) and its gradients (n, 3). The level is the sum of (x / a)^2 minus 1."""
         own = self._own(points) / self.radii
         return np.vecdot(own, own) - 1, 2 * (own / self.radii) @ self.pose[:3, :3].T
 
@@ -110,7 +110,7 @@ class Ring:
         return replace(self, pose=pose @ self.pose)
 
     def level(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return the level (n,), the squared distance from the circle minus the tube's squared radius, and its gradients (n, 3)."""
+        """Return the level (n,) and its gradients (n, 3). The level is the squared distance from the circle minus ``tube**2``."""
         across = points - self._nearest(points)
         return np.vecdot(across, across) - self.tube**2, 2 * across
 
@@ -150,7 +150,7 @@ class Ring:
         return np.where(crosses[:, None], inner, point)
 
     def _outward(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return unit vectors (n, 3) and distances (n,) from the axis; for a point on the axis, the first axis of the pose."""
+        """Return unit vectors (n, 3) away from the axis (or, on it, along the first axis of the pose), and distances (n,)."""
         arm = points - self.pose[:3, 3]
         flat = arm - (arm @ self.pose[:3, 2])[:, None] * self.pose[:3, 2]
         away = np.sqrt(np.vecdot(flat, flat))

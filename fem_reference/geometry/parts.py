@@ -64,7 +64,7 @@ def _rim_edges(parts: Parts) -> Ints:
 
 
 def _along_rims(parts: Parts) -> Floats:
-    """Points (n, 3), with points on rims moved along the rim towards the midpoint of their neighbours; corners and ends stay."""
+    """Points (n, 3), with points on rims moved along them towards the midpoint of their neighbours; rims keep corners and ends."""
     edges = _rim_edges(parts)
     count = len(parts.points)
     both = np.concatenate([edges, edges[:, ::-1]])
@@ -145,7 +145,7 @@ def _flatness(points: Floats, triangles: Ints) -> Floats:
 def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Floats:
     """Points (n, 3) [mm], moved so that the parts have the ``areas`` [mm2], from label 1 on, and the surface encloses ``volume``.
 
-    Before the move, areas and volume are too small, like those of a polygon inscribed in a circle. In each round the rim of each
+    Before the move, areas and volume are too small, like the area of a polygon inscribed in a circle. In each round the rim of each
     part moves outwards by a uniform distance of at most ``most`` [mm], and then all points move along their normals.
     """
     for _ in range(_ROUNDS):

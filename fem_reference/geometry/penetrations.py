@@ -28,7 +28,7 @@ _GRID = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 
 _CORNERS = _GRID.argmax(axis=0)
 # The maximum edge of the first cubes [mm], and the minimum number of first cubes along the longest extent of the surface.
 _FIRST_EDGE, _FIRST_CUBES = 10.0, 20
-# The volume is not computed if the box around the surface is larger than this many of the largest first cubes (a cubic metre).
+# The volume is not computed if the box around the surface is larger than this many cubes of edge ``_FIRST_EDGE`` (a cubic metre).
 _TOO_MANY = 1e6
 # The maximum number of subdivisions; the maximum number of cubes after each of them, and of points drawn in the last cubes.
 _ROUNDS, _MOST = 3, 8000

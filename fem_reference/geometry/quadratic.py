@@ -71,7 +71,7 @@ class Displaced:
         return sizes @ np.einsum("q,kqi->ki", _BULK, self.velocity), sizes @ moments
 
     def _facets(self, on: str) -> tuple[Ints, Ints]:
-        """Return the tet (m,) of each facet of a region, and the facet's nodes (m, 6) in it: outward corners, then midpoints."""
+        """Return the tet (m,) of each facet of a region, and the facet's local nodes (m, 6): outward corners, then midpoints."""
         size = len(self.mesh.points)
         found, wanted = (
             (ends[:, 0] * size + ends[:, 1]) * size + ends[:, 2]
@@ -91,5 +91,5 @@ def _rule(element: skfem.ElementTriP2 | skfem.ElementTetP2) -> tuple[Floats, Flo
 
 
 def quadratic(nodal: Floats) -> Floats:
-    """Values (k, 10, c) at the ten nodes of tets, from ``nodal``: these values or, if linear, the values (k, 4, c) at corners."""
+    """Values (k, 10, c) at the ten nodes of tets. ``nodal``: these values or, if linear, the values (k, 4, c) at the corners."""
     return nodal if nodal.shape[1] == 10 else np.concatenate([nodal, nodal[:, EDGES].mean(axis=2)], axis=1)

@@ -101,7 +101,7 @@ class Between:
 
 
 def samples(surface: Surface) -> Floats:
-    """Points (n, 3) [mm] inside a closed ``surface``, each for an equal volume: from a grid of about 20,000 nodes around it."""
+    """Points (n, 3) [mm] inside a closed ``surface``, each representing an equal volume, from a grid of about 20,000 nodes."""
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     step = np.cbrt(np.prod(high - low) / _SAMPLES)
     axes = [np.linspace(a, b, 2 * max(1, round((b - a) / step)) + 1)[1::2] for a, b in zip(low, high, strict=True)]

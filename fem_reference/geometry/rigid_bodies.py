@@ -38,8 +38,8 @@ class Obstacle(Protocol):
         """The maximum depth [mm] of a point inside the bone."""
 
     def clearance(self, within: float) -> Callable[[Floats], Floats]:
-        """Return a function of points (n, 3) [mm]. It gives a lower bound (n,) [mm] on the length of any path from each point to
-        within ``within`` [mm] of the bone.
+        """Return a function of points (n, 3) [mm]. It gives a lower bound (n,) [mm] on the length of any path from each point to a
+        place whose distance to the bone is at most ``within`` [mm].
         """
 
     def sample(self, points: Floats) -> Sampled:
@@ -138,7 +138,7 @@ class Capsule(_Rod):
 
 @dataclass(frozen=True)
 class Box(Exact):
-    """A box about ``centre`` of outer ``size`` [mm] along the axes, with edges and corners of the radius ``rounding`` [mm]."""
+    """A box of outer ``size`` [mm] along the axes, about ``centre``, with edges and corners of the radius ``rounding`` [mm]."""
 
     centre: Vector
     size: Vector
@@ -175,7 +175,7 @@ class Cylinder(_Rod):
         return float(min(self.radius, np.linalg.norm(np.subtract(self.end, self.start)) / 2))
 
     def sample(self, points: Floats) -> Sampled:
-        """Distance and derivatives to a rectangle in the half-plane of distances from the axis and, along it, from the centre."""
+        """Distance, and its derivatives, to a rectangle in the half-plane of distance from the axis and position along it."""
         axis, extent = _axis(self.start, self.end)
         away = points - (np.asarray(self.start, float) + self.end) / 2
         along = away @ axis

@@ -25,12 +25,12 @@ from fem_reference.geometry.sectors import attached_area, sectors, shares_at
 # These parameters were chosen by trials on hip muscles. The smoothing length of the shares, in triangle sizes (a larger value
 # rounds corners more).
 _SMOOTHED = 0.1
-# A vertex that is nearer to a crossing than this fraction of the edge moves onto it. Above 0.35 triangles degenerate; below 0.25
-# slivers remain.
+# A vertex that is nearer to a crossing of an edge with the rim than this fraction of the edge moves onto the crossing. Above 0.35
+# triangles degenerate; below 0.25 slivers remain.
 _NEAR = 0.3
 # A vertex that cannot move and is nearer to a crossing than this fraction of the edge counts as lying on the rim.
 _THERE = 0.2
-# An edge across a piece of an attachment, or across a gap in it, is cut if more than this fraction of it is in the piece or gap.
+# An edge across a piece of, or a gap in, an attachment is cut if more than this fraction of the edge is in the piece or gap.
 _NARROW = 0.3
 _REFINED = 2  # number of rounds of the search for narrow pieces and gaps
 _ISLAND = 0.1  # the minimum area of an island of an attachment that is kept, relative to the squared triangle size
@@ -85,7 +85,7 @@ def _smoothed(surface: Surface, shares: Floats, length: float) -> Floats:
 
 
 def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
-    """Add a point in each island of an attachment that has at least ``least`` [mm2] but contains no point of the coarse surface."""
+    """Add a point in each island with an area of at least ``least`` [mm2] that contains no point of the coarse surface."""
     number = _islands(fine, shares)
     attached = number >= 0
     thirds = np.tile(triangle_areas(fine.points, fine.triangles)[:, None] / 3, 3)
@@ -195,7 +195,7 @@ class _Crossings:
 
 
 def _cut(parts: Parts, fine: Surface, crossings: _Crossings, label: int) -> Parts:
-    """Cut triangles along the crossings; free triangles inside get the ``label``."""
+    """Cut triangles along the crossings; free triangles inside the rim get the ``label``."""
     points, signs = _snapped(parts, fine, crossings)
     ends = crossings.edges.ends
     split = np.flatnonzero(signs[ends[:, 0]] * signs[ends[:, 1]] < 0)
@@ -211,7 +211,7 @@ def _cut(parts: Parts, fine: Surface, crossings: _Crossings, label: int) -> Part
 
 
 def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats, Ints]:
-    """Points (n, 3), moved to nearby crossings unless they would leave a sharp edge or another rim; signs (n,), 0 on the rim."""
+    """Points (n, 3), moved to near crossings unless they would leave a sharp edge or another rim; and signs (n,), 0 on the rim."""
     across = ~np.isnan(crossings.fractions[:, 0])
     ends, fractions = crossings.edges.ends[across], crossings.fractions[across]
     point = np.concatenate([ends[:, 0], ends[:, 1]])

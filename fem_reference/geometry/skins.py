@@ -20,7 +20,7 @@ _QUARTERS = np.array(
     ]
 ) / 2  # fmt: skip
 _RULE = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
-# The minimum number of points along the diagonal of a surface; it puts points on hip muscles 3 mm apart.
+# The minimum number of points along the diagonal of a surface; on hip muscles, points are then 3 mm apart.
 _ACROSS = 80
 
 
@@ -65,7 +65,7 @@ def embedded(places: Floats, areas: Floats, mesh: TetMesh) -> Skin:
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Pieces of triangles: the ``parents`` (k,), indices of the triangles, and barycentric ``corners`` (k, 3, 3) of the pieces."""
+    """Pieces of triangles. ``parents`` (k,): indices of the triangles; ``corners`` (k, 3, 3): barycentric coordinates in these."""
 
     parents: Ints
     corners: Floats

@@ -1,6 +1,6 @@
 """Fibres inside a muscle from Catmull-Rom splines between fibres on its surface.
 
-The method is CHMD by Kohout and Cholt (report DCSE/TR-2022-03, 6.1.2).
+The method is that of Kohout and Cholt, called CHMD (report DCSE/TR-2022-03, 6.1.2).
 """
 
 from collections.abc import Sequence

@@ -11,7 +11,7 @@ from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpac
 
 # The number of sides of a full circle, a multiple of eight. Triangles then lie at most 0.36 % of the radius inside the shape.
 TURN = 64
-# For a half-space: half the width of its slab, and the slab's thickness, relative to the extent of the points ``beside`` it.
+# For a half-space: half the width of its slab, and the slab's thickness, relative to the diagonal of the points ``beside``.
 _REACH, _THICKNESS = 1.5, 0.1
 
 

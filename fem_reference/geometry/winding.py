@@ -14,8 +14,8 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.obstacles import Quadric, SmoothSurface, Touch
 from fem_reference.geometry.taut_strings import MOST, Flags, halved, longest, met, taut, touching
 
-# The number of steps of a geodesic. The error at its end is about (length / radius)^5 / (120 _STEPS^4) times the radius, which is
-# 1e-7 for half a turn.
+# The number of steps of a geodesic. The error at its end is about (length / radius)^5 / (120 _STEPS^4) times the radius, or
+# 2e-7 of the radius for half a turn.
 _STEPS = 60
 # The maximum number of Newton iterations; their tolerance, as a fraction of the distance between the ends plus the lengths of the
 # geodesics; and the finite-difference step.
@@ -28,8 +28,8 @@ _CHECKED = 200
 class Winding:
     """n paths through K ``knots`` (n, K, 3) [mm], with unit ``tangents`` (n, K, 3) and arc lengths ``arcs`` (n, K) [mm].
 
-    Each path passes the obstacles ``met`` (n, m) in this order, each with the same number of knots. If it passes fewer than m
-    obstacles, the remaining knots are at its end. ``failed`` (n,) is True where Newton's method found no path.
+    Each path passes the obstacles ``met`` (n, m) in this order, with the same number of knots on each. If it passes fewer than m
+    obstacles, the remaining knots are at its end. ``failed`` (n,) is True where no valid path was found.
     """
 
     knots: Floats
@@ -251,7 +251,7 @@ def _better(pieces: _Pieces, change: Floats, before: Floats) -> tuple[_Pieces, F
 
 
 def _geodesic(obstacle: SmoothSurface, points: Floats, along: Floats, sizes: Floats) -> tuple[Floats, Floats]:
-    """Points and unit tangents (steps + 1, n, 3) of geodesics of ``sizes`` (n,) from ``points``, in the directions ``along``."""
+    """Points and unit tangents (steps + 1, n, 3) of geodesics of length ``sizes`` (n,) from ``points``, in directions ``along``."""
     step, path = (sizes / _STEPS)[:, None], [(points, along)]
     half, bent = step / 2, obstacle.curving
     for _ in range(_STEPS):

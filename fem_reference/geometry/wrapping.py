@@ -74,8 +74,8 @@ class Paths:
 
 
 def around(obstacle: Quadric, starts: Floats, ends: Floats) -> Paths:
-    """Compute the shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, along a great circle through both
-    points, or around a cylinder, along a helix. Points inside the obstacle are treated as lying on its surface.
+    """Compute the shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm] around a sphere, in the plane of its centre and
+    both points, or around a cylinder, along a helix. Points inside the obstacle are treated as lying on its surface.
     """
     middle = obstacle.pose[:3, 3]
     if np.isfinite(obstacle.radii[2]):
@@ -100,7 +100,7 @@ def _around(starts: Floats, ends: Floats, middle: Floats, axes: Floats, radius: 
 
     Seen along the axis, two points at distances d1, d2 from it and at an angle t from each other are joined by tangents of length
     sqrt(d^2 - r^2) and an arc of length r (t - acos(r / d1) - acos(r / d2)). If the angle in brackets is not positive, the path
-    is straight. The displacement along the axis is uniform over the length of these: unrolled, the path is a straight line.
+    is straight. The displacement along the axis is uniform over the length of tangents and arc: unrolled, the path is straight.
     """
     one, other = _across(starts - middle, axes), _across(ends - middle, axes)
     sines, cosines = np.sum(np.cross(one, other) * axes, axis=1), np.sum(one * other, axis=1)
