@@ -228,7 +228,7 @@ ADDED = {
     "regions in the export to FEBio, the law corotated": 140,
     "error bars from two runs at a time, on tetrahedra that can be set up": 110,
     "lines that end at facets out of reach": 15,
-    "docstrings that say in sentences what each argument and result is": 1440,
+    "docstrings that say in sentences what each argument and result is": 1460,
     "distinct rows as sorted integers, keys of stored meshes with all code, a loader that counts": 96,
 }
 # The same limit for lines of code: those that are neither blank nor part of a comment or a docstring.
