@@ -68,7 +68,7 @@ HEAD = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n"
         ("POINTS 99999999999 double\n0 0 0\n", "numbers declared in"),
         ("POINTS -1 double\n0 0 0\n", 'a count of "-1"'),
         ("POINTS 1 double\n0 0 0\nPOLYGONS 1 4\n3 0 0 7\n", "cell 0 with a point outside 0 to 0"),
-        ("POINTS 1 double\n0 0 0\nPOLYGONS 1 4\n99 0 0 0\n", "cells that do not fit"),
+        ("POINTS 1 double\n0 0 0\nPOLYGONS 1 4\n99 0 0 0\n", "do not add up to 3 corners"),
         ("POINTS 1 string\n0 0 0\n", 'numbers of type "string"'),
         ("NONSENSE 1 2\n", 'a section "NONSENSE"'),
     ],
