@@ -182,7 +182,7 @@ def _seeds(field: FibreField) -> Floats:
 
 
 def spread(points: Floats, count: int) -> Floats:
-    """Choose at most ``count`` of ``points`` (k, d): first the nearest to their mean, then each time the farthest from all chosen."""
+    """Choose at most ``count`` of ``points`` (k, d): first the nearest to their mean, then always the farthest from all chosen."""
     chosen = [_first_best(-np.linalg.norm(points - points.mean(axis=0), axis=1))]
     distances = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):

@@ -121,7 +121,7 @@ class ScalarCase(Case):
         return (0,)
 
     def standards(self, of: str) -> frozenset[Standard]:
-        """The standards as in ``Case.standards``, except that the reference has no rest state to be measured against."""
+        """The standards as in ``Case.standards``, and the exact solution if known; the rest state is no standard of a field."""
         found: set[Standard] = {"itself"}
         if self.exact is not None:
             found.add("exact")
