@@ -131,7 +131,7 @@ def compare(
     """Measure the runs of a case and judge them, with the ``reference`` as the truth.
 
     Only the data that a run carries are judged. ``candidates`` have all frames of the case, with NaN in frames that were not
-    reached. A verdict is inconclusive if the error bar extends to both sides of the tolerance. Raises InputError if the case
+    reached. A verdict is inconclusive if the error bar is partly outside the tolerance. Raises InputError if the case
     expects a measure of a named run, and this run has no surface from which to compute it.
     """
     context, runs = metrics.context_of(setup, reference), (reference, *candidates)

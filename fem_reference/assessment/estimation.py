@@ -18,7 +18,7 @@ class CurveError:
 
 @dataclass(frozen=True)
 class HeightError:
-    """The error of a fit by Gaussians to the heights of every second vertex of an attached area above the plane of this area.
+    """The error of Gaussians fitted to an attached area: to the height of every second vertex above the plane of the area.
 
     ``centres``: the number of Gaussians. ``choice``: the method by which their positions are chosen. ``rms``: the error [mm] at the
     other vertices. ``condition``: the condition number of the matrix.
@@ -103,7 +103,7 @@ class AnswerChange:
 
 @dataclass(frozen=True)
 class Estimation:
-    """The errors of all techniques; ``missing``: by case, why it was left out; ``answers``: changes of results, if requested."""
+    """The errors of all techniques. ``missing``: the reason for each case that was left out; ``answers``: changes, if requested."""
 
     curves: tuple[CurveError, ...]
     heights: tuple[HeightError, ...]

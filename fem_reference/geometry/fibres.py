@@ -16,7 +16,7 @@ from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.nested import EDGES
 
 POINTS = 40  # the number of points on each line
-_NEAR = 1e-3  # a line has arrived at an attachment where the field is this close to 0 or 1
+_NEAR = 1e-3  # a line has arrived at an attachment if the field differs from 0 or 1 by at most this
 # Seeds whose scores differ by less than this fraction are taken in the order of their indices, so that rotating a mesh does not
 # change the lines.
 _TIES = 1e-6
@@ -43,7 +43,7 @@ class FibreField:
         return {name: value for name, value in vars(self).items() if name not in ("locator", "size")}
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
-        """Unit vectors (n, 3) along the fibres at rest ``points`` (n, 3); the ``cells`` have no influence."""
+        """Unit vectors (n, 3) along the fibres at the rest positions ``points`` (n, 3); ``cells`` is ignored."""
         found = self.directions(points)
         flat = np.linalg.norm(found, axis=1) < 0.5  # zero gradient: all nearby mesh points belong to one attachment
         if flat.any():
@@ -118,7 +118,7 @@ class NearestLine:
         return {"lines": self.lines}
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
-        """Unit vectors (n, 3) at rest ``points`` (n, 3)."""
+        """Unit vectors (n, 3) at the rest positions ``points`` (n, 3); ``cells`` is ignored."""
         middles, directions = self.segments
         _, nearest = cKDTree(middles).query(points)
         return np.asarray(directions[nearest])
@@ -142,7 +142,7 @@ class Turned:
     matrix: Floats
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:
-        """Unit vectors (n, 3) at rest ``points`` (n, 3) in ``cells`` (n,)."""
+        """Unit vectors (n, 3) at the rest positions ``points`` (n, 3) in ``cells`` (n,)."""
         return np.asarray(self.directions(cells, points) @ self.matrix.T)
 
 
@@ -163,8 +163,8 @@ def averaged(mesh: TetMesh, slopes: Floats) -> Floats:
 
 
 def _seeds(field: FibreField) -> Floats:
-    """Points (k, 3) at which the field is 1/2, some distance below the skin: the centre of each cut of a tet, and points halfway
-    from there to the corners of the cut.
+    """Points (k, 3) on the section where the field is 1/2, except those near the skin: in each tet that it cuts, the centre of the
+    cut, and the points halfway from there to the corners of the cut.
     """
     mesh = field.mesh
     ends = mesh.tets[:, EDGES]
@@ -182,7 +182,7 @@ def _seeds(field: FibreField) -> Floats:
 
 
 def spread(points: Floats, count: int) -> Floats:
-    """Choose at most ``count`` of ``points`` (k, d): first the most central, then each time the farthest from those chosen."""
+    """Choose at most ``count`` of ``points`` (k, d): first the nearest to their mean, then always the farthest from all chosen."""
     chosen = [_first_best(-np.linalg.norm(points - points.mean(axis=0), axis=1))]
     distances = np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):
@@ -203,7 +203,7 @@ def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[
     step = sign * field.size / 4
     lines = [[seed] for seed in seeds]
     going, points, ascent = np.arange(len(seeds)), seeds, field.directions(seeds)
-    # A line that is four times as long as the mesh must run in circles.
+    # A line four times as long as the diagonal of the mesh must run in circles.
     for _ in range(4 * int(field.locator.diagonal / abs(step))):
         points = _runge_kutta(field, points, ascent, step)
         ascent, goes_on = field.sampled(points)

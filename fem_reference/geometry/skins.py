@@ -20,14 +20,14 @@ _QUARTERS = np.array(
     ]
 ) / 2  # fmt: skip
 _RULE = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
-# The minimum number of points along the diagonal of a surface; on hip muscles, points are then 3 mm apart.
+# The minimum number of points along the diagonal of a surface's bounding box; on hip muscles, points are then 3 mm apart.
 _ACROSS = 80
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Material points of a surface that a mesh follows only approximately. ``cells`` (n,): the straight cells that carry the
-    points; ``points`` (n, 3) [mm]: the rest positions, possibly slightly outside these cells; ``areas`` (n,) [mm2]: the rest areas.
+    """Material points on a surface that a mesh only approximates. ``cells`` (n,): the straight cell that carries each point;
+    ``points`` (n, 3) [mm]: the rest positions, possibly slightly outside the cells; ``areas`` (n,) [mm2]: the rest areas.
     """
 
     cells: Ints
@@ -41,8 +41,8 @@ def spacing(surface: Surface) -> float:
 
 
 def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float) -> Skin:
-    """Place material points on the attached part of a ``surface``, on average at most ``apart`` [mm] from each other, carried by
-    ``mesh``. Their areas are weighted by the attached ``shares`` (m, 3) of the corners of the m triangles, interpolated linearly.
+    """Place material points, carried by ``mesh``, on the attached part of a ``surface``, on average at most ``apart`` [mm] apart.
+    Their areas are multiplied by the attached share, interpolated linearly from ``shares`` (m, 3) at the corners of m triangles.
     """
     pieces, corners = Pieces.whole(np.flatnonzero(shares.any(axis=1))), surface.points[surface.triangles]
     while len(pieces.parents) and edge_lengths(pieces.of(corners)).mean() > apart:
@@ -59,7 +59,7 @@ def points(corners: Floats, shares: Floats) -> tuple[Floats, Floats]:
 
 
 def embedded(places: Floats, areas: Floats, mesh: TetMesh) -> Skin:
-    """Create the skin of points ``places`` (n, 3) [mm] with ``areas`` (n,) [mm2], carried by ``mesh``."""
+    """Create a skin from the points ``places`` (n, 3) [mm] with ``areas`` (n,) [mm2], carried by ``mesh``."""
     return Skin(Locator(mesh).embed(places).tets, places, areas)
 
 
@@ -83,7 +83,7 @@ class Pieces:
         return Pieces(np.concatenate(parents), np.concatenate(corners))
 
     def of(self, values: Floats) -> Floats:
-        """Interpolate ``values`` (m, 3, d) at the corners of triangles linearly to the corners of the pieces (k, 3, d)."""
+        """Interpolate ``values`` (m, 3, d) linearly from the corners of the triangles to the corners (k, 3, d) of the pieces."""
         return self.corners @ values[self.parents]
 
     def quartered(self) -> "Pieces":
@@ -99,7 +99,7 @@ class Pieces:
 
 
 def quartered(corners: Floats) -> Floats:
-    """Cut triangles with ``corners`` (k, 3, 3) into four at the midpoints of their edges; returns (4 k, 3, 3), part by part."""
+    """Cut triangles with ``corners`` (k, 3, 3) into four; returns (4 k, 3, 3): all first parts, then all second parts, ..."""
     return np.asarray(np.einsum("qcj,kji->qkci", _QUARTERS, corners).reshape(-1, 3, 3))
 
 
@@ -109,7 +109,7 @@ def edge_lengths(corners: Floats) -> Floats:
 
 
 def cut(surface: Surface, triangles: Ints, apart: float) -> Pieces:
-    """Cut ``triangles`` (k,) of a ``surface`` into four, or into two if thin, until the mean edge of each is at most ``apart``."""
+    """Cut ``triangles`` (k,) into four, or two if thin, repeatedly, until no piece has a mean edge longer than ``apart`` [mm]."""
     corners, pieces = surface.points[surface.triangles], Pieces.whole(triangles)
     while (large := (lengths := edge_lengths(pieces.of(corners))).mean(axis=1) > apart).any():
         thin = large & (lengths.max(axis=1) ** 2 > _THIN * corner_areas(pieces.of(corners)))

@@ -16,7 +16,7 @@ from fem_reference.geometry.obstacles import Quadric, Touch
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """n paths. ``parts`` (n, 3) [mm]: the lengths before, on and after the surface; a straight path lies entirely before it.
+    """n paths. ``parts`` (n, 3) [mm]: the lengths before, on and after the surface; the last two are 0 for a straight path.
 
     ``starts``, ``ends``: the end points; ``touches``: the points where each path arrives at the surface and leaves it, all
     (n, 3) [mm]. On the surface a path rotates by ``turns`` (n,) [rad] about the unit ``axes`` (n, 3) through ``middles`` (n, 3),
@@ -37,7 +37,7 @@ class Paths:
         return np.zeros(len(self.parts), dtype=bool)
 
     def touching(self) -> list[Touch]:
-        """Return the contact as if paths arrived at their starts and left at their ends, which gives the same resultant force."""
+        """Return a contact for each path, from its start to its end, with the same resultant force as contact on the surface."""
         first, last = self.directions()
         return [Touch(np.zeros(len(self.parts), dtype=np.int64), self.starts, first, self.ends, last)]
 

@@ -36,7 +36,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
 
 def over_edges(name: str, deviations: Floats, edges: Edges, reference: Run, **more: Floats) -> tuple[Measure, ...]:
-    """The measures of the metric ``name``, computed from the deviation of each edge. The worst place of a frame is the edge that
+    """The measures of the metric ``name``, computed from the deviation of each edge. The worst place in a frame is the edge that
     deviates most.
 
     ``deviations`` (f, e): deviation of each of the e edges in each of the f frames. ``more``: values (f,) of further statistics.

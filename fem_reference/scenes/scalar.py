@@ -11,13 +11,13 @@ from fem_reference.foundations.records import Record, increasing, one_of, rule
 from fem_reference.scenes.case import Case, Standard
 
 _Nodes = Annotated[
-    tuple[float, ...], Field(min_length=2), AfterValidator(partial(increasing, want="nodes that increase"))
+    tuple[float, ...], Field(min_length=2), AfterValidator(partial(increasing, want="nodes in increasing order"))
 ]
 
 
 class Interval(Record):
     """An interval with ``count`` nodes from ``start`` to ``end``, both included. The inner nodes are evenly spaced or, with a
-    ``seed`` of random numbers, at random positions.
+    ``seed`` for random numbers, at random positions.
     """
 
     start: float
@@ -62,7 +62,7 @@ class Boundary(Record):
 
     The first form has the key ``on``: an end of an interval, or the ``rim`` (the boundary) of a triangle mesh. It prescribes the
     ``value`` of the field (Dirichlet) or its ``slope`` along the outward normal (Neumann). A formula ``where`` limits the condition
-    to facets at all of whose vertices the formula is positive.
+    to facets on which the formula is positive at every vertex.
 
     The second form has the key ``bounds`` alone: a file in the format of listing 4.5 of the report DCSE/TR-2022-03, with a row of
     vertex numbers, counted from 1, and a row of the values that are prescribed at these vertices.
@@ -121,7 +121,7 @@ class ScalarCase(Case):
         return (0,)
 
     def standards(self, of: str) -> frozenset[Standard]:
-        """The standards against which a run is measured; a field has no rest state. ``of``: as in ``Case.standards``."""
+        """The standards as in ``Case.standards``, and the exact solution if known; the rest state is no standard of a field."""
         found: set[Standard] = {"itself"}
         if self.exact is not None:
             found.add("exact")

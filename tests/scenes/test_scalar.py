@@ -27,7 +27,7 @@ def scene(folder: Path, **tables: object) -> ScalarCase:
         ({"boundary": [{"value": 1}]}, r'exactly one of "on" and "bounds"'),
         ({"boundary": [{"bounds": "a.csv", "value": 1}]}, r'"bounds" alone'),
         ({"domain": {}}, r'exactly one of "interval", "nodes"'),
-        ({"domain": {"nodes": [0.0, 0.0]}}, r"nodes that increase"),
+        ({"domain": {"nodes": [0.0, 0.0]}}, r"nodes in increasing order"),
         ({"domain": {"interval": {"start": 1.0, "end": 0.0, "count": 3}}}, r"an end beyond the start"),
         ({"domain": INTERVAL | {"nodes": [0.0, 1.0]}}, r'exactly one of "interval", "nodes"'),
         ({"boundary": [{"on": "left", "value": 1, "slope": 0}]}, r'exactly one of "value" and "slope"'),

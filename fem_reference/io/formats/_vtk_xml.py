@@ -1,4 +1,4 @@
-"""VTK's XML formats, read with numpy alone. No array is larger than the number of bytes in the file allows.
+"""VTK's XML formats, read with numpy alone. The number of bytes in the file limits the size of each array.
 
 VTK's own readers are native code that trusts the file: a wrong number in a file can crash or hang the process.
 """
@@ -31,7 +31,7 @@ def read(data: bytes) -> DataSet:
     head, mark, appended = data.partition(b"<AppendedData")
     check_no_entities(head)
     if mark and not _END.search(data, max(0, len(data) - 1000)):
-        raise ValueError("no end of the appended data")
+        raise ValueError("appended data without a closing tag")
     root = fromstring(head + b"</VTKFile>" if mark else data)
     kind = root.get("type", "unknown")
     if root.tag != "VTKFile" or kind not in _KINDS:
@@ -98,15 +98,15 @@ class _Arrays:
         if form == "appended":
             offset = int(array.attrib["offset"])
             if not 0 <= offset <= len(self.appended):
-                raise ValueError(f"an array at byte {offset} of {len(self.appended)}")
+                raise ValueError(f"an array at byte {offset}, outside the {len(self.appended)} bytes of appended data")
             data, encoded = memoryview(self.appended)[offset:], self.encoded
         else:
             data, encoded = memoryview("".join(text.split()).encode("ascii")), True
         return np.frombuffer(self._bytes(data, _decoded if encoded else _taken), self.order + kind)
 
     def _bytes(self, data: memoryview, take: Callable[[memoryview, int], bytes]) -> bytes:
-        """The bytes stored at the beginning of ``data``, where a header states their number or the lengths of compressed blocks.
-        ``take``: a function that returns a number of bytes from the beginning of the data.
+        """The bytes stored at the beginning of ``data``, after a header with their number or with the lengths of compressed blocks.
+        ``take``: a function that returns the first bytes of given data, as many as requested.
         """
         size = self.header.itemsize
         if not self.compressor:
