@@ -23,6 +23,7 @@ from fem_reference.foundations.mesh import (
     tet_volumes,
     triangle_areas,
 )
+from fem_reference.foundations.rows import distinct
 from fem_reference.geometry.fibres import POINTS, FibreField, averaged, resample, spread
 
 MOST = 1000  # the maximum number of fibres
@@ -60,7 +61,7 @@ def area_flux(mesh: TetMesh, start: str, end: str) -> Flow:
     tetrahedron exactly equals the flux into the next (Marini 1985, SIAM J. Numer. Anal. 22:493).
     """
     triangles = _triangles(mesh)
-    _, first, numbers = np.unique(triangles, axis=0, return_index=True, return_inverse=True)
+    _, first, numbers, _ = distinct(triangles)
     faces, count = numbers.reshape(-1, 4), len(first)
     inverse = np.linalg.inv(edge_vectors(mesh.points[mesh.tets]))
     rises = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
@@ -102,8 +103,7 @@ def _triangles(mesh: TetMesh) -> Ints:
 
 def _numbers(triangles: Ints, facets: Ints) -> Ints:
     """Index (m,) of each of ``facets`` (m, 3) among the distinct ``triangles`` (n, 3), whose corners are sorted."""
-    _, numbers = np.unique(np.concatenate([triangles, np.sort(facets, axis=1)]), axis=0, return_inverse=True)
-    return np.asarray(numbers.ravel()[len(triangles) :])
+    return distinct(np.concatenate([triangles, np.sort(facets, axis=1)])).which[len(triangles) :]
 
 
 def _starts(flux: Flow, count: int) -> tuple[Ints, Floats]:

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from fem_reference.foundations.mesh import Bools, Floats, Ints, Surface, triangle_areas, unit_normals
+from fem_reference.foundations.rows import distinct
 from fem_reference.geometry.coarsening import flip_edges, free_part, inflate, slide
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.edges import Edges
@@ -84,7 +85,7 @@ def _along_rims(parts: Parts) -> Floats:
 
 def collapsed(parts: Parts, short: float) -> Parts:
     """Collapse edges shorter than ``short`` [mm] that end on a rim, if the surface and the rims then keep their shape."""
-    ends = np.unique(np.sort(parts.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    ends = distinct(np.sort(parts.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)).rows
     lengths = np.linalg.norm(parts.points[ends[:, 0]] - parts.points[ends[:, 1]], axis=1)
     next_on_rim: list[list[int]] = [[] for _ in parts.points]
     for one, other in _rim_edges(parts).tolist():
@@ -164,8 +165,8 @@ def _outwards(parts: Parts, label: int) -> tuple[Floats, float]:
     ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     corners = parts.points[triangles]
     normals = np.repeat(unit_normals(corners), 3, axis=0)
-    _, which, count = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
-    alone = count[which.ravel()] == 1
+    _, _, which, count = distinct(np.sort(ends, axis=1))
+    alone = count[which] == 1
     along = parts.points[ends[alone, 1]] - parts.points[ends[alone, 0]]
     directions = np.zeros_like(parts.points)
     for end in ends[alone].T:

@@ -166,7 +166,7 @@ def resolve(surface: Surface, error: float, margin: float, rounding: float = 0.0
     surface = _outward(surface)
     spacing = float(np.ptp(surface.points, axis=0).max()) / _FIRST_CELLS
     fitted = _sampled(surface, spacing, margin)
-    while not (reached := _mean(_beside(fitted(0.0), surface))) <= error:
+    while not (reached := _rms(_beside(fitted(0.0), surface))) <= error:
         spacing /= 2
         if math.prod(_extent(surface, spacing, margin)[1]) > MOST_NODES:
             logger.warning("%s: distance error of %.3g mm instead of %.3g mm", surface.place, reached, error)
@@ -248,7 +248,7 @@ def _measured(grid: Grid, surface: Surface) -> Grid:
     """Return the grid with its errors [mm]: the largest one on the surface and near it, and the root mean square near it."""
     beside = _beside(grid, surface)
     largest = max(np.abs(grid.distances(_on(surface))).max(), np.abs(beside).max())
-    return replace(grid, error=float(largest), mean_error=_mean(beside))
+    return replace(grid, error=float(largest), mean_error=_rms(beside))
 
 
 def _beside(grid: Grid, surface: Surface) -> Floats:
@@ -257,7 +257,7 @@ def _beside(grid: Grid, surface: Surface) -> Floats:
     return grid.distances(around) - signed_distances(around, surface)
 
 
-def _mean(differences: Floats) -> float:
+def _rms(differences: Floats) -> float:
     return float(np.sqrt(np.mean(differences**2)))
 
 
